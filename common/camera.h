@@ -1,0 +1,63 @@
+// Camera models: which ray a pixel sees, and which pixel sees a point. Camera axes are OpenCV's (+x right, +y down,
+// +z forward); the centre of the upper left pixel is (0, 0).
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+
+#include "common/math.h"
+
+namespace lumen {
+
+enum class CameraModel { kPinhole, kKannalaBrandt, kScaramuzza };
+
+// What calibration gives, in double and in px; which members count depends on the model.
+struct CameraIntrinsics {
+  CameraModel model = CameraModel::kPinhole;
+  int width = 0;
+  int height = 0;
+  double cx = 0;
+  double cy = 0;
+  double fx = 0;                            // pinhole, Kannala–Brandt
+  double fy = 0;
+  std::array<double, 4> k{};                // Kannala–Brandt: r = θ + k1 θ³ + k2 θ⁵ + k3 θ⁷ + k4 θ⁹
+  std::array<double, 5> a{};                // Scaramuzza: z = a0 + a1 ρ + a2 ρ² + a3 ρ³ + a4 ρ⁴, a1 = 0
+  std::array<double, 3> stretch{1, 0, 0};   // Scaramuzza: c, d, e of S = [[c, e], [d, 1]]
+};
+
+// C3VD's official calibration (CF-HQ190L, 1350×1080).
+CameraIntrinsics C3vdIntrinsics();
+// EndoMapper's Endoscope_01 (1440×1080), whose polynomial folds back at 94.25°.
+CameraIntrinsics EndomapperIntrinsics();
+
+// The same camera with an image of another size: pixel edges, not centres, are scaled.
+CameraIntrinsics Resized(const CameraIntrinsics& intrinsics, int width, int height);
+
+// Projection and unprojection in T = float or double.
+template <class T>
+class Camera {
+ public:
+  // Throws InputError where the parameters describe no camera (fx ≤ 0, S singular, …).
+  explicit Camera(const CameraIntrinsics& intrinsics);
+
+  // Unit direction in camera axes that the pixel sees. Nothing where the pixel has no ray: beyond the fold of the
+  // model's polynomial. Pixels outside the image are answered by the model all the same.
+  std::optional<Vec3<T>> Unproject(const Vec2<T>& pixel) const;
+
+  // Pixel that sees a point in camera axes (any length, mm or unit). Nothing where none does: the origin, behind a
+  // pinhole, beyond the fold. The pixel may lie outside the image.
+  std::optional<Vec2<T>> Project(const Vec3<T>& point) const;
+
+  // Largest angle to the axis, rad, at which the model is one-to-one.
+  T max_angle_rad() const { return max_angle_rad_; }
+  const CameraIntrinsics& intrinsics() const { return intrinsics_; }
+
+ private:
+  CameraIntrinsics intrinsics_;
+  T max_angle_rad_;
+  T max_radius_;  // of the model's own image plane, where max_angle_rad_ lands
+  // The implementer may add private members.
+};
+
+}  // namespace lumen

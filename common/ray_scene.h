@@ -1,0 +1,65 @@
+// A mesh that rays can be shot at, through Embree. The only file that knows Embree (3.13 and 4).
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "common/math.h"
+#include "common/mesh.h"
+
+namespace lumen {
+
+inline constexpr uint32_t kNoFace = 0xffffffffu;
+
+struct RayHit {
+  uint32_t face = kNoFace;
+  float t = 0;          // in units of the direction's length
+  float u = 0, v = 0;   // barycentric: point = (1−u−v)·v0 + u·v1 + v·v2
+  bool hit() const { return face != kNoFace; }
+};
+
+// Sixteen rays with a common origin or nearly so (a pixel block's primary rays, their shadow rays): structure of
+// arrays, as packets want it. A lane with tfar < tnear is off.
+struct alignas(64) RayPacket {
+  static constexpr int kSize = 16;
+  float origin[3][kSize];
+  float direction[3][kSize];
+  float tnear[kSize], tfar[kSize];
+};
+struct alignas(64) HitPacket {
+  uint32_t face[RayPacket::kSize];
+  float t[RayPacket::kSize], u[RayPacket::kSize], v[RayPacket::kSize];
+};
+
+// Rays are float and relative to anchor(), so that a mesh far from the world's origin keeps its precision. Const
+// members may be called from any thread. Both sides of a face are hit.
+class RayScene {
+ public:
+  // The mesh is referred to, not copied: it must outlive the scene.
+  explicit RayScene(const Mesh& mesh);
+  ~RayScene();
+  RayScene(RayScene&&) noexcept;
+  RayScene& operator=(RayScene&&) noexcept;
+
+  const Mesh& mesh() const;
+  // The world point, mm, that is the origin of the rays' coordinates (the middle of the mesh's bounds).
+  const Vec3d& anchor() const;
+  Vec3f ToLocal(const Vec3d& world) const { return (world - anchor()).cast<float>(); }
+
+  RayHit Intersect(const Vec3f& origin, const Vec3f& direction, float tnear, float tfar) const;
+  bool Occluded(const Vec3f& origin, const Vec3f& direction, float tnear, float tfar) const;
+  void Intersect(const RayPacket& rays, HitPacket* hits) const;
+  // occluded[i] = 1 where ray i meets anything.
+  void Occluded(const RayPacket& rays, uint8_t occluded[RayPacket::kSize]) const;
+
+  // Distance in double to the plane of a face that a float ray has found, in world coordinates; the ground truth's
+  // depth. Units of the direction's length.
+  double ExactDistance(uint32_t face, const Vec3d& origin, const Vec3d& direction) const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace lumen

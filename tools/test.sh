@@ -1,0 +1,9 @@
+#!/usr/bin/env bash
+# Installs what is missing, builds, and runs every test. Arguments go to ctest, e.g. -R Camera.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+
+tools/build.sh
+build=${LUMEN_BUILD:-build}
+ctest --test-dir "$build" --output-on-failure --timeout 600 -j "$(nproc)" "$@"
+echo "The tests' log lies at $build/Testing/Temporary/LastTest.log"
