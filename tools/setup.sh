@@ -2,9 +2,10 @@
 # Installs the Debian 12 packages that lumen is built from. Does nothing when all are there.
 set -euo pipefail
 
+# openimageio-tools: Debian's CMake file of OpenImageIO refuses to load without its programs.
 packages=(
   g++ cmake ninja-build
-  libembree-dev libopenimageio-dev libeigen3-dev libcgal-dev libopenmesh-dev libtbb-dev
+  libembree-dev libopenimageio-dev openimageio-tools libeigen3-dev libcgal-dev libopenmesh-dev libtbb-dev
   libtomlplusplus-dev libcli11-dev nlohmann-json3-dev libgtest-dev libbenchmark-dev fonts-dejavu-core
 )
 
