@@ -1,8 +1,10 @@
-// Spotlight sources (SLS) of an endoscope and the irradiance they give: intensity · exp(−spread·(1 − D·L)) / d², with
-// L the unit direction from source to point (Modrzejewski et al. 2020; calibrated for endoscopes in EndoMapper).
+// Spotlight sources (SLS) of an endoscope and the irradiance they give: intensity · exp(−spread·(1 − D·L)) /
+// d², with L the unit direction from source to point (Modrzejewski et al. 2020; calibrated for endoscopes in
+// EndoMapper).
 #pragma once
 
 #include <cmath>
+#include <limits>
 #include <vector>
 
 #include "common/math.h"
@@ -11,10 +13,10 @@ namespace lumen {
 
 // One light guide, in camera axes.
 struct LightSource {
-  Vec3d position = Vec3d::Zero();           // mm
-  Vec3d direction = Vec3d::UnitZ();         // unit
-  double spread = 0;                        // dimensionless; 0 = the same in all directions
-  Vec3d intensity = Vec3d::Ones();          // mm², RGB: full scale times mm² on the axis
+  Vec3d position = Vec3d::Zero();    // mm
+  Vec3d direction = Vec3d::UnitZ();  // unit
+  double spread = 0;                 // dimensionless; 0 = the same in all directions
+  Vec3d intensity = Vec3d::Ones();   // mm², RGB: full scale times mm² on the axis
 };
 
 struct Light {
@@ -28,13 +30,21 @@ Light EndomapperLight();
 // The part of a source's irradiance that all channels share.
 template <class T>
 struct Irradiance {
-  Vec3<T> toward;    // unit, from the point to the source
-  T per_intensity;   // 1/mm²: exp(−spread·(1 − D·L)) / d², on a patch that faces the source
+  Vec3<T> toward;   // unit, from the point to the source
+  T per_intensity;  // 1/mm²: exp(−spread·(1 − D·L)) / d², on a patch that faces the source
 };
 
 // At a point in the same axes as the source. A point on the source itself has no direction: toward is 0 and
 // per_intensity infinite; callers that can get there must look.
 template <class T>
-Irradiance<T> IrradianceAt(const Vec3<T>& position, const Vec3<T>& direction, T spread, const Vec3<T>& point);
+Irradiance<T> IrradianceAt(const Vec3<T>& position, const Vec3<T>& direction, T spread,
+                           const Vec3<T>& point) {
+  const Vec3<T> to_source = position - point;
+  const T squared = to_source.squaredNorm();
+  if (squared == 0) return {Vec3<T>::Zero(), std::numeric_limits<T>::infinity()};
+  const Vec3<T> toward = to_source / std::sqrt(squared);
+  const T cos_angle = -direction.dot(toward);
+  return {toward, std::exp(-spread * (1 - cos_angle)) / squared};
+}
 
 }  // namespace lumen
