@@ -43,13 +43,14 @@ void WriteImage(const std::filesystem::path& file, const Image16& image);
 
 // A float32 EXR with named channels ("radiance.R", "z", …); image.channels names, in order.
 void WriteExr(const std::filesystem::path& file, const ImageF& image, const std::vector<std::string>& channel_names);
-// Reads it back, with the names. Throws InputError.
+// Reads any float EXR, with the names of its channels, in the order in which EXR readers give them (not always that
+// of writing). Throws InputError.
 ImageF ReadExr(const std::filesystem::path& file, std::vector<std::string>* channel_names);
 
 // Width and height without reading the pixels. Throws InputError.
 void ReadImageSize(const std::filesystem::path& file, int* width, int* height);
 
-// Writes text into an 8-bit RGB image with its lower left corner at (x, y). Does nothing where the machine has no
+// Writes text into an 8-bit RGB image, its base line starting at (x, y). Does nothing where the machine has no
 // font.
 void DrawText(Image8* image, int x, int y, int size_px, const std::string& text, const uint8_t rgb[3]);
 

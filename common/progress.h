@@ -27,6 +27,7 @@ class Progress {
   std::string what_;
   bool shown_;
   std::chrono::steady_clock::time_point start_, drawn_;
+  double first_done_ = -1;  // of the first Update
   std::mutex mutex_;
 };
 
