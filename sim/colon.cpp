@@ -122,6 +122,10 @@ void CheckShape(const ConfigTable& geometry, const ColonShape& shape, const Colo
     geometry.Fail("taenia_width_mm", "three taeniae would cover more than half of the circumference");
 }
 
+Vec3d TopOf(const Polyp& polyp, const ColonWall& wall) {
+  return wall.At({std::cos(polyp.angle_rad), std::sin(polyp.angle_rad), polyp.at_mm});
+}
+
 void CheckPolyps(const ConfigTable& geometry, const std::vector<Polyp>& polyps, const ColonWall& wall) {
   const std::vector<ConfigTable> tables = geometry.Tables("polyps");
   for (size_t i = 0; i < polyps.size(); ++i) {
@@ -129,15 +133,18 @@ void CheckPolyps(const ConfigTable& geometry, const std::vector<Polyp>& polyps, 
     if (polyps[i].at_mm < clear || polyps[i].at_mm > wall.length_mm() - clear)
       tables[i].Fail("at_mm", "the polyp reaches over an end of the tube: keep it between " +
                                   Millimetres(clear) + " and " + Millimetres(wall.length_mm() - clear));
-    const Vec3d at = wall.At({std::cos(polyps[i].angle_rad), std::sin(polyps[i].angle_rad), polyps[i].at_mm});
-    const double to_axis = (at - wall.centreline().At(polyps[i].at_mm).point).norm();
-    if (foot > 0.6 * wall.InnerRadius() || to_axis < 2 || ColonWall::Height(polyps[i]) > wall.InnerRadius())
+    // On its own side of the centreline a polyp can't touch the opposite wall; its neighbourhood has no
+    // folds.
+    const CentrelineFrame frame = wall.centreline().At(polyps[i].at_mm);
+    const Vec3d at = TopOf(polyps[i], wall);
+    const double beyond_middle = (at - frame.point)
+                                     .dot(std::cos(polyps[i].angle_rad) * frame.normal +
+                                          std::sin(polyps[i].angle_rad) * frame.binormal);
+    if (beyond_middle < 2 || clear > 0.5 * (beyond_middle + ColonWall::Height(polyps[i])))
       tables[i].Fail("size_mm", "the polyp would fill the lumen: make it smaller");
     for (size_t k = 0; k < i; ++k) {
-      const Vec3d other =
-          wall.At({std::cos(polyps[k].angle_rad), std::sin(polyps[k].angle_rad), polyps[k].at_mm});
       const double apart = 1.3 * (clear + std::max(ColonWall::FootRadius(polyps[k]), polyps[k].size_mm / 2));
-      if ((at - other).norm() < apart)
+      if ((at - TopOf(polyps[k], wall)).norm() < apart)
         tables[i].Fail("at_mm", "the polyp touches polyp " + std::to_string(k) + " (from 0): move them " +
                                     Millimetres(apart) + " apart");
     }
@@ -215,7 +222,7 @@ Geometry BuildColon(const ConfigTable& geometry, uint64_t seed) {
                                                  [&](const auto& s) { return s.name == name; });
 
   const ColonShape shape = ReadShape(geometry, segment, seed);
-  const double tolerance_mm = geometry.Number("tolerance_mm", 0.01, Range{1e-4, 1});
+  const double tolerance_mm = geometry.Number("tolerance_mm", 0.015, Range{1e-4, 1});
   const ColonWall wall(shape, Centreline(ReadCurve(geometry, segment)));
   CheckShape(geometry, shape, wall);
   CheckPolyps(geometry, shape.polyps, wall);
