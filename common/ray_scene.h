@@ -14,13 +14,13 @@ inline constexpr uint32_t kNoFace = 0xffffffffu;
 
 struct RayHit {
   uint32_t face = kNoFace;
-  float t = 0;          // in units of the direction's length
-  float u = 0, v = 0;   // barycentric: point = (1−u−v)·v0 + u·v1 + v·v2
+  float t = 0;         // in units of the direction's length
+  float u = 0, v = 0;  // barycentric: point = (1−u−v)·v0 + u·v1 + v·v2
   bool hit() const { return face != kNoFace; }
 };
 
-// Sixteen rays with a common origin or nearly so (a pixel block's primary rays, their shadow rays): structure of
-// arrays, as packets want it. A lane with tfar < tnear is off.
+// Sixteen rays with a common origin or nearly so (a pixel block's primary rays, their shadow rays): structure
+// of arrays, as packets want it. A lane with tfar < tnear is off.
 struct alignas(64) RayPacket {
   static constexpr int kSize = 16;
   float origin[3][kSize];
@@ -32,11 +32,17 @@ struct alignas(64) HitPacket {
   float t[RayPacket::kSize], u[RayPacket::kSize], v[RayPacket::kSize];
 };
 
-// Rays are float and relative to anchor(), so that a mesh far from the world's origin keeps its precision. Const
-// members may be called from any thread. Both sides of a face are hit.
+// Rays are float and relative to anchor(), so that a mesh far from the world's origin keeps its precision.
+// Const members may be called from any thread. Both sides of a face are hit; faces without area are not.
+//
+// No ray slips through a closed mesh between two faces. One aimed at a vertex to the last bit can (one in a
+// hundred), so a test whether a vertex is seen asks what is Occluded short of it, not what is hit there.
+// Where a ray meets an edge, either face may be reported, and a packet may answer the other one than a single
+// ray does; but the same question gets the same answer for any number of threads.
 class RayScene {
  public:
-  // The mesh is referred to, not copied: it must outlive the scene.
+  // The mesh is referred to, not copied: it must outlive the scene. Throws InputError for a face that names a
+  // vertex which doesn't exist, std::runtime_error where memory runs out.
   explicit RayScene(const Mesh& mesh);
   ~RayScene();
   RayScene(RayScene&&) noexcept;
@@ -53,8 +59,9 @@ class RayScene {
   // occluded[i] = 1 where ray i meets anything.
   void Occluded(const RayPacket& rays, uint8_t occluded[RayPacket::kSize]) const;
 
-  // Distance in double to the plane of a face that a float ray has found, in world coordinates; the ground truth's
-  // depth. Units of the direction's length.
+  // Distance in double to the plane of a face that a float ray has found, in world coordinates; the ground
+  // truth's depth. Units of the direction's length; never outside the face's corners along the ray, so that
+  // slivers and faces without area give something near them too.
   double ExactDistance(uint32_t face, const Vec3d& origin, const Vec3d& direction) const;
 
  private:

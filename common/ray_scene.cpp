@@ -1,0 +1,256 @@
+#include "common/ray_scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <stdexcept>
+#include <string>
+
+#include "common/error.h"
+
+#if __has_include(<embree4/rtcore.h>)
+#include <embree4/rtcore.h>
+#else
+#include <embree3/rtcore.h>
+#endif
+
+namespace lumen {
+namespace {
+
+#if RTC_VERSION_MAJOR >= 4
+
+RTCIntersectArguments IntersectArguments(bool coherent) {
+  RTCIntersectArguments arguments;
+  rtcInitIntersectArguments(&arguments);
+  arguments.flags = coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
+  return arguments;
+}
+
+RTCOccludedArguments OccludedArguments(bool coherent) {
+  RTCOccludedArguments arguments;
+  rtcInitOccludedArguments(&arguments);
+  arguments.flags = coherent ? RTC_RAY_QUERY_FLAG_COHERENT : RTC_RAY_QUERY_FLAG_INCOHERENT;
+  return arguments;
+}
+
+void Trace(RTCScene scene, RTCRayHit* ray) {
+  RTCIntersectArguments arguments = IntersectArguments(false);
+  rtcIntersect1(scene, ray, &arguments);
+}
+void Trace(RTCScene scene, RTCRay* ray) {
+  RTCOccludedArguments arguments = OccludedArguments(false);
+  rtcOccluded1(scene, ray, &arguments);
+}
+void Trace(RTCScene scene, const int* valid, RTCRayHit16* rays) {
+  RTCIntersectArguments arguments = IntersectArguments(true);
+  rtcIntersect16(valid, scene, rays, &arguments);
+}
+void Trace(RTCScene scene, const int* valid, RTCRay16* rays) {
+  RTCOccludedArguments arguments = OccludedArguments(true);
+  rtcOccluded16(valid, scene, rays, &arguments);
+}
+
+#else
+
+RTCIntersectContext Context(bool coherent) {
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = coherent ? RTC_INTERSECT_CONTEXT_FLAG_COHERENT : RTC_INTERSECT_CONTEXT_FLAG_INCOHERENT;
+  return context;
+}
+
+void Trace(RTCScene scene, RTCRayHit* ray) {
+  RTCIntersectContext context = Context(false);
+  rtcIntersect1(scene, &context, ray);
+}
+void Trace(RTCScene scene, RTCRay* ray) {
+  RTCIntersectContext context = Context(false);
+  rtcOccluded1(scene, &context, ray);
+}
+void Trace(RTCScene scene, const int* valid, RTCRayHit16* rays) {
+  RTCIntersectContext context = Context(true);
+  rtcIntersect16(valid, scene, &context, rays);
+}
+void Trace(RTCScene scene, const int* valid, RTCRay16* rays) {
+  RTCIntersectContext context = Context(true);
+  rtcOccluded16(valid, scene, &context, rays);
+}
+
+#endif
+
+void ThrowOnDeviceError(RTCDevice device, const std::string& doing) {
+  const RTCError error = rtcGetDeviceError(device);
+  if (error == RTC_ERROR_NONE) return;
+  const std::string what =
+      error == RTC_ERROR_OUT_OF_MEMORY ? "not enough memory" : "error " + std::to_string(error);
+  throw std::runtime_error("Embree: " + what + " while " + doing);
+}
+
+// One device for all scenes, for as long as the program runs: released by the operating system, since scenes
+// with static lifetime may outlive any destructor here.
+RTCDevice SharedDevice() {
+  static const RTCDevice device = [] {
+    const RTCDevice created = rtcNewDevice(nullptr);
+    if (!created) ThrowOnDeviceError(nullptr, "opening a device");
+    return created;
+  }();
+  return device;
+}
+
+void CheckFaces(const Mesh& mesh) {
+  const int count = static_cast<int>(mesh.vertices.size());
+  for (size_t face = 0; face < mesh.faces.size(); ++face) {
+    if (mesh.faces[face].minCoeff() < 0 || mesh.faces[face].maxCoeff() >= count) {
+      throw InputError("mesh: face " + std::to_string(face) + " names a vertex beyond the " +
+                       std::to_string(count) + " there are; export the mesh again");
+    }
+  }
+}
+
+RTCRay SingleRay(const Vec3f& origin, const Vec3f& direction, float tnear, float tfar) {
+  RTCRay ray{};
+  ray.org_x = origin.x();
+  ray.org_y = origin.y();
+  ray.org_z = origin.z();
+  ray.dir_x = direction.x();
+  ray.dir_y = direction.y();
+  ray.dir_z = direction.z();
+  ray.tnear = tnear;
+  ray.tfar = tfar;
+  ray.mask = ~0u;  // 0 would meet nothing
+  return ray;
+}
+
+void FillRays(const RayPacket& rays, RTCRay16* out, int valid[RayPacket::kSize]) {
+  constexpr int kSize = RayPacket::kSize;
+  std::copy_n(rays.origin[0], kSize, out->org_x);
+  std::copy_n(rays.origin[1], kSize, out->org_y);
+  std::copy_n(rays.origin[2], kSize, out->org_z);
+  std::copy_n(rays.direction[0], kSize, out->dir_x);
+  std::copy_n(rays.direction[1], kSize, out->dir_y);
+  std::copy_n(rays.direction[2], kSize, out->dir_z);
+  std::copy_n(rays.tnear, kSize, out->tnear);
+  std::copy_n(rays.tfar, kSize, out->tfar);
+  std::fill_n(out->time, kSize, 0.0f);
+  std::fill_n(out->mask, kSize, ~0u);
+  std::fill_n(out->id, kSize, 0u);
+  std::fill_n(out->flags, kSize, 0u);
+  for (int i = 0; i < kSize; ++i) valid[i] = rays.tnear[i] <= rays.tfar[i] ? -1 : 0;
+}
+
+}  // namespace
+
+struct RayScene::State {
+  const Mesh* mesh;
+  Vec3d anchor;
+  RTCScene scene;
+
+  explicit State(const Mesh& mesh) : mesh(&mesh), anchor(Vec3d::Zero()) {
+    CheckFaces(mesh);
+    if (!mesh.vertices.empty()) {
+      Eigen::AlignedBox3d box;
+      for (const Vec3d& vertex : mesh.vertices) box.extend(vertex);
+      anchor = box.center();
+    }
+    const RTCDevice device = SharedDevice();
+    scene = rtcNewScene(device);
+    // Robust: without it, of rays aimed at edges of a closed tube of 205k faces one in twenty slips through
+    // and of two million others one; with it none. Single rays cost 10% more, packets 3%. High build quality
+    // gains nothing on the even triangles of a colon.
+    rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
+    if (!mesh.faces.empty()) Attach(device);
+    rtcCommitScene(scene);
+    const RTCError error = rtcGetDeviceError(device);
+    if (error != RTC_ERROR_NONE) rtcReleaseScene(scene);
+    ThrowOnDeviceError(device, "building a scene of " + std::to_string(mesh.faces.size()) + " faces");
+  }
+  ~State() { rtcReleaseScene(scene); }
+  State(const State&) = delete;
+  State& operator=(const State&) = delete;
+
+  void Attach(RTCDevice device) {
+    const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+    auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), mesh->vertices.size()));
+    auto* indices = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(
+        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), mesh->faces.size()));
+    if (vertices && indices) {
+      for (const Vec3d& vertex : mesh->vertices) {
+        const Vec3f local = (vertex - anchor).cast<float>();
+        vertices = std::copy_n(local.data(), 3, vertices);
+      }
+      for (const Vec3i& face : mesh->faces) indices = std::copy_n(face.data(), 3, indices);
+      rtcCommitGeometry(geometry);
+      rtcAttachGeometry(scene, geometry);
+    }
+    rtcReleaseGeometry(geometry);
+  }
+};
+
+RayScene::RayScene(const Mesh& mesh) : state_(std::make_unique<State>(mesh)) {}
+RayScene::~RayScene() = default;
+RayScene::RayScene(RayScene&&) noexcept = default;
+RayScene& RayScene::operator=(RayScene&&) noexcept = default;
+
+const Mesh& RayScene::mesh() const { return *state_->mesh; }
+const Vec3d& RayScene::anchor() const { return state_->anchor; }
+
+RayHit RayScene::Intersect(const Vec3f& origin, const Vec3f& direction, float tnear, float tfar) const {
+  RTCRayHit query;
+  query.ray = SingleRay(origin, direction, tnear, tfar);
+  query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  query.hit.primID = kNoFace;
+  query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
+  Trace(state_->scene, &query);
+  if (query.hit.geomID == RTC_INVALID_GEOMETRY_ID) return {};
+  return {query.hit.primID, query.ray.tfar, query.hit.u, query.hit.v};
+}
+
+bool RayScene::Occluded(const Vec3f& origin, const Vec3f& direction, float tnear, float tfar) const {
+  RTCRay ray = SingleRay(origin, direction, tnear, tfar);
+  Trace(state_->scene, &ray);
+  return ray.tfar == -std::numeric_limits<float>::infinity();
+}
+
+void RayScene::Intersect(const RayPacket& rays, HitPacket* hits) const {
+  RTCRayHit16 query;
+  alignas(64) int valid[RayPacket::kSize];
+  FillRays(rays, &query.ray, valid);
+  std::fill_n(query.hit.geomID, RayPacket::kSize, RTC_INVALID_GEOMETRY_ID);
+  std::fill_n(query.hit.instID[0], RayPacket::kSize, RTC_INVALID_GEOMETRY_ID);
+  Trace(state_->scene, valid, &query);
+  for (int i = 0; i < RayPacket::kSize; ++i) {
+    const bool hit = query.hit.geomID[i] != RTC_INVALID_GEOMETRY_ID;
+    hits->face[i] = hit ? query.hit.primID[i] : kNoFace;
+    hits->t[i] = hit ? query.ray.tfar[i] : 0;
+    hits->u[i] = hit ? query.hit.u[i] : 0;
+    hits->v[i] = hit ? query.hit.v[i] : 0;
+  }
+}
+
+void RayScene::Occluded(const RayPacket& rays, uint8_t occluded[RayPacket::kSize]) const {
+  RTCRay16 query;
+  alignas(64) int valid[RayPacket::kSize];
+  FillRays(rays, &query, valid);
+  Trace(state_->scene, valid, &query);
+  for (int i = 0; i < RayPacket::kSize; ++i) {
+    occluded[i] = valid[i] && query.tfar[i] == -std::numeric_limits<float>::infinity();
+  }
+}
+
+double RayScene::ExactDistance(uint32_t face, const Vec3d& origin, const Vec3d& direction) const {
+  const Vec3i& corners = state_->mesh->faces[face];
+  Vec3d from_origin[3], along;
+  for (int i = 0; i < 3; ++i) {
+    from_origin[i] = state_->mesh->vertices[corners[i]] - origin;
+    along[i] = from_origin[i].dot(direction) / direction.squaredNorm();
+  }
+  const Vec3d normal = (from_origin[1] - from_origin[0]).cross(from_origin[2] - from_origin[0]);
+  const double distance = normal.dot(from_origin[0]) / normal.dot(direction);
+  // A point of the triangle lies between its corners along the ray. The bound matters for a sliver, or a face
+  // seen edge-on, which rounding to float let the ray find although in double it has no plane worth the name.
+  if (std::isnan(distance)) return (along.minCoeff() + along.maxCoeff()) / 2;
+  return std::clamp(distance, along.minCoeff(), along.maxCoeff());
+}
+
+}  // namespace lumen
