@@ -1,4 +1,4 @@
-// Triangle meshes and their files (PLY, OBJ, OFF, STL) through OpenMesh.
+// Triangle meshes and their files: PLY, OBJ, OFF, STL.
 #pragma once
 
 #include <array>
@@ -21,7 +21,8 @@ struct Mesh {
 // InputError naming the file and the place: unreadable, no faces, an index out of range, a coordinate not finite.
 Mesh ReadMesh(const std::filesystem::path& file);
 
-// The extension chooses the format. Whole or not at all. Throws InputError.
+// The extension chooses the format; all but STL, which is float, keep every digit. Only PLY and OBJ have colours.
+// Whole or not at all. Throws InputError.
 void WriteMesh(const std::filesystem::path& file, const Mesh& mesh);
 
 // C3VD's coverage_mesh.obj: the faces' vt index is 1 = observed, 2 = unobserved. `observed` has an entry a face.
@@ -38,7 +39,7 @@ double FaceArea(const Mesh& mesh, int face);
 // Unit normal of a face by the right-hand rule; zero for a face without area.
 Vec3d FaceNormal(const Mesh& mesh, int face);
 
-// Unit normals at the vertices, the adjoining faces' weighted by their angles.
+// Unit normals at the vertices, the adjoining faces' weighted by their angles; zero where there is no such face.
 std::vector<Vec3d> VertexNormals(const Mesh& mesh);
 
 }  // namespace lumen
