@@ -68,15 +68,16 @@ size_t EditDistance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
-// The candidate that was most likely meant; empty where none resembles the key.
+// The candidate that was most likely meant; empty where none resembles the key. Words of one or two letters
+// are all alike.
 template <class Candidates>
 std::string Nearest(std::string_view key, const Candidates& candidates) {
   std::string nearest;
-  size_t least = std::max<size_t>(2, key.size() / 3) + 1;
+  if (key.size() < 3) return nearest;
+  size_t least = std::max(std::min<size_t>(2, key.size() / 2), key.size() / 3) + 1;
   for (const std::string& candidate : candidates) {
     const size_t distance = EditDistance(key, candidate);
-    // Words of one or two letters are all alike.
-    if (distance < least && distance < std::max(key.size(), candidate.size())) {
+    if (distance < least) {
       least = distance;
       nearest = candidate;
     }
@@ -218,9 +219,13 @@ struct ConfigTable::Node {
   // `what` says what should be there: "a number".
   const toml::node& Require(std::string_view key, const std::string& what) const {
     if (const toml::node* node = Find(key)) return *node;
-    std::vector<std::string> present;
-    for (const auto& [name, unused] : *table) present.emplace_back(name.str());
-    const std::string nearest = Nearest(key, present);
+    // A key that somebody knows is no misspelling of this one.
+    std::vector<std::string> strangers;
+    const auto& known = document->asked[table];
+    for (const auto& [name, unused] : *table) {
+      if (!known.contains(name.str())) strangers.emplace_back(name.str());
+    }
+    const std::string nearest = Nearest(key, strangers);
     const std::string remedy = nearest.empty() ? "" : " (is \"" + nearest + "\" a slip of the pen?)";
     FailAt(*document, Joined(path, key), table->source().begin.line,
            "missing; " + what + " is needed" + remedy);

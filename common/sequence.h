@@ -42,7 +42,8 @@ struct Sequence {
   std::filesystem::path ground_truth_mesh;  // empty = none
 };
 
-// Reads sequence.toml (or falls back to C3VD's calibration), calibration.toml on top where there is one, pose.txt,
+// Reads sequence.toml (or falls back to C3VD's calibration), calibration.toml on top where there is one ([light],
+// [response] and [frames] gain, each in place of the sequence's own), pose.txt,
 // and finds the frames' files, in the layout of C3VD v1 or v2. Pixels are not read. Throws InputError naming file
 // and place: unknown or missing keys, a pose line short of numbers or no rotation (not orthonormal within 1e-3),
 // fewer poses or gains than colour files, no frame at all, a mask of another size.
@@ -61,7 +62,7 @@ Image8 ReadColor(const Sequence& sequence, const SequenceFrame& frame);
 // Pixels that carry image: inside the mask and with a ray. One channel, 255 = yes.
 Image8 ValidPixels(const Calibration& calibration);
 
-// C3VD's encodings. Nothing (no surface) is NaN in float images and 0 in depth files.
+// C3VD's encodings. Nothing (no surface) is NaN in float images and 0 in all channels of the files.
 Image16 EncodeDepth(const ImageF& z_mm);            // floor(65535·z/100); beyond 100 mm: 65535
 ImageF DecodeDepth(const Image16& encoded);         // mm at the middle of the step; beyond: +infinity; nothing: NaN
 Image16 EncodeNormals(const ImageF& normal);        // v = (n + 1)/2·65535, rounded

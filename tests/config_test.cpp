@@ -80,7 +80,9 @@ TEST(Config, ErrorsNameFileLineKeyAndRemedy) {
   EXPECT_EQ(ErrorOf([&] { camera.Number("height"); }),
             "scene.toml:2: camera.height: missing; a number is needed");
   EXPECT_EQ(ErrorOf([&] { camera.Number("widht"); }),
-            "scene.toml:2: camera.widht: missing; a number is needed (is \"width\" a slip of the pen?)");
+            "scene.toml:2: camera.widht: missing; a number is needed");
+  EXPECT_EQ(ErrorOf([&] { root.Number("titel"); }),
+            "scene.toml:1: titel: missing; a number is needed (is \"title\" a slip of the pen?)");
   EXPECT_EQ(ErrorOf([&] { camera.Numbers("a", 5); }),
             "scene.toml:4: camera.a: has 3 elements, but must be an array of 5 numbers");
   EXPECT_EQ(ErrorOf([&] { camera.Numbers("a", 3, kNotNegative); }),
