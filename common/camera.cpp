@@ -168,7 +168,7 @@ std::optional<Vec2<T>> Camera<T>::Project(const Vec3<T>& point) const {
   const T z = point.z();
   if (sideways == 0) return z > 0 ? std::optional(centre_) : std::nullopt;
   if (intrinsics_.model == CameraModel::kPinhole) {
-    if (!(z > 0)) return std::nullopt;
+    if (!(z > 0) || std::isnan(sideways)) return std::nullopt;
     return centre_ + pixel_from_plane_ * Vec2<T>(point.template head<2>() / z);
   }
   const T angle = std::atan2(sideways, z);
