@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "common/math.h"
+#include "common/mesh.h"
 
 namespace lumen {
 
@@ -48,5 +49,10 @@ std::vector<Vec3d> CurveThrough(const std::vector<Vec3d>& control_points);
 // Distance in mm between the nearest two places of the curve that are more than `apart_mm` of arc from each
 // other; infinity where it is too short for that. O(n²) over points 1 mm apart.
 double NearestPass(const Centreline& centreline, double apart_mm);
+
+// The middle of a tube, open or closed: along its edges from one end (the vertex farthest from any) to the
+// other, the centroids of slices of equal distance, `slice_mm` thick. Good to a fraction of the tube's
+// radius; empty where there are fewer than three slices.
+std::vector<Vec3d> MiddleOfTube(const Mesh& mesh, double slice_mm);
 
 }  // namespace lumen

@@ -1,11 +1,12 @@
 #include "sim/geometry.h"
 
 #include "sim/colon.h"
+#include "sim/mesh_source.h"
 
 namespace lumen {
 
 Geometry BuildGeometry(const ConfigTable& geometry, uint64_t seed) {
-  geometry.Choice("kind", {"colon"});
+  if (geometry.Choice("kind", {"colon", "mesh"}) == "mesh") return LoadMeshSource(geometry);
   return BuildColon(geometry, seed);
 }
 
