@@ -1,0 +1,35 @@
+// Renders a scene into a sequence folder.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "sim/scene.h"
+
+namespace lumen {
+
+struct RenderOptions {
+  std::filesystem::path folder;
+  int first_frame = 0;
+  int last_frame = -1;  // exclusive; −1 = all
+  uint64_t seed = 0;
+};
+
+struct RenderResult {
+  double seconds = 0;
+  int frames = 0;
+  int64_t samples = 0;
+  int64_t rays = 0;
+  int64_t not_finite = 0;       // samples left out
+  std::string first_not_finite;  // where the first was and how to replay it
+  std::vector<std::string> effects;
+};
+
+// Writes the frames [first, last) of the scene, poses, gains and ground truth. Frames, gains included, don't depend on
+// which others are rendered. A folder that holds a sequence already gets its files replaced; frames of its own that
+// the new one doesn't have are removed. Throws InputError.
+RenderResult Render(const Scene& scene, const RenderOptions& options);
+
+}  // namespace lumen

@@ -1,0 +1,39 @@
+// A scene file as plain values: everything that a render depends on, besides the seed.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/sequence.h"
+#include "sim/geometry.h"
+#include "sim/path.h"
+#include "sim/sensor.h"
+#include "sim/surface.h"
+
+namespace lumen {
+
+struct TruthOptions {
+  bool c3vd = true;                // depth, normals, flow, occlusion in C3VD's encodings
+  std::vector<std::string> exact;  // channels of exact/NNNN.exr
+};
+
+struct Scene {
+  Calibration calibration;
+  Geometry geometry;
+  std::vector<Pose> world_from_camera;
+  Surface surface;
+  PathOptions path;
+  Sensor sensor;
+  TruthOptions truth;
+  std::vector<std::string> effects;  // that the scene names, for reports
+};
+
+// Reads a scene file (scenes/README.md) and builds its geometry and trajectory. settings: "path.to.key=value". Throws
+// InputError with file, line and remedy.
+Scene ReadScene(const std::filesystem::path& file, const std::vector<std::string>& settings, uint64_t seed);
+
+// Names that [truth] exact may hold.
+const std::vector<std::string>& ExactChannels();
+
+}  // namespace lumen

@@ -1,0 +1,50 @@
+// What the mucosa does with light: a Lambertian wall whose albedo is a solid texture of place, with blood vessels.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+
+#include "common/config.h"
+#include "common/math.h"
+
+namespace lumen {
+
+// Smooth variation of the albedo: every channel times exp(contrast · noise), noise within ±1.
+struct Mottling {
+  double contrast = 0.2;
+  double scale_mm = 8;  // of its coarsest pattern
+};
+
+// Vessels: curves where a noise field crosses 0; in them the albedo is multiplied by exp(−absorption).
+struct Vessels {
+  double spacing_mm = 9;
+  double width_mm = 0.6;
+  Vec3d absorption = Vec3d(0.15, 0.7, 0.5);  // haemoglobin absorbs green and blue, hardly red
+};
+
+struct Surface {
+  Vec3d albedo = Vec3d(0.80, 0.35, 0.30);
+  std::optional<Mottling> mottling;
+  std::optional<Vessels> vessels;
+};
+
+// Reads the scene's [surface].
+Surface ReadSurface(const ConfigTable& surface);
+
+// Smooth noise in ±1 at a point, period-free, a function of seed (Perlin 2002: gradients at the integer lattice,
+// quintic interpolation).
+float GradientNoise(uint64_t seed, const Vec3f& point);
+
+// Albedo at a place, mm in the mesh's own axes; each channel within [0, 1] (what a texture would lift above is cut).
+Vec3f AlbedoAt(const Surface& surface, uint64_t seed, const Vec3f& place_mm);
+
+// Lambert's lobe as the triple eval / sample / pdf. Directions point away from the surface, cosines are to its
+// normal. The BRDF is albedo/π.
+namespace lambert {
+inline Vec3f Eval(const Vec3f& albedo) { return albedo * static_cast<float>(1 / kPi); }
+inline float Pdf(float cosine) { return cosine > 0 ? cosine * static_cast<float>(1 / kPi) : 0.0f; }
+// A direction about `normal` with density cos/π, from two numbers in [0, 1)².
+Vec3f Sample(const Vec3f& normal, const Vec2f& random);
+}  // namespace lambert
+
+}  // namespace lumen
