@@ -1,11 +1,76 @@
+#include <fmt/core.h>
+
+#include <memory>
+
+#include "common/config.h"
 #include "common/error.h"
+#include "common/files.h"
+#include "tools/findings.h"
 #include "tools/options.h"
 
 namespace lumen {
+namespace {
+
+namespace fs = std::filesystem;
+
+enum class Subject { kSequence, kMesh, kScene };
+
+Subject SubjectOf(const fs::path& path) {
+  if (fs::is_directory(path)) return Subject::kSequence;
+  if (path.extension() != ".toml") return Subject::kMesh;
+  const ConfigTable root = Config::Read(path).root();
+  return root.Has("format") && root.String("format") == "lumen-sequence" ? Subject::kSequence
+                                                                         : Subject::kScene;
+}
+
+// What can't be read at all is a finding as well.
+nlohmann::json Check(const fs::path& path, Findings* findings) {
+  try {
+    switch (SubjectOf(path)) {
+      case Subject::kSequence: {
+        const fs::path folder = fs::is_directory(path) ? path : path.parent_path();
+        return {{"sequence", CheckSequence(ReadSequence(folder.empty() ? "." : folder), findings)}};
+      }
+      case Subject::kMesh:
+        return {{"mesh", CheckMesh(path.string(), ReadMesh(path), findings)}};
+      case Subject::kScene:
+        throw InputError(path.string() + ": scenes can't be checked yet");
+    }
+  } catch (const InputError& error) {
+    findings->Error(error.what());
+  }
+  return nlohmann::json::object();
+}
+
+nlohmann::json Run(const fs::path& path, const CommonOptions& options) {
+  Findings findings;
+  nlohmann::json result = Check(path, &findings);
+  result["findings"] = nlohmann::json::array();
+  for (const Finding& finding : findings.all()) {
+    const char* severity = finding.severity == Finding::Severity::kError ? "error" : "warning";
+    fmt::print("{}: {}\n", severity, finding.text);
+    result["findings"].push_back({{"severity", severity}, {"text", finding.text}});
+  }
+  const auto errors = findings.errors();
+  result["errors"] = errors.size();
+  result["warnings"] = findings.all().size() - errors.size();
+  if (errors.empty()) {
+    fmt::print("{}: no errors\n", path.string());
+    return result;
+  }
+  // The result is due although the command fails.
+  if (!options.json.empty()) WriteFile(options.json, result.dump(2) + "\n");
+  if (errors.size() == 1) throw InputError(errors[0]);
+  throw InputError(fmt::format("{}: {} errors, the first: {}", path.string(), errors.size(), errors[0]));
+}
+
+}  // namespace
 
 void AddCheck(CLI::App* app) {
-  AddSubcommand(app, "check", "says what is wrong with a sequence, a mesh or a scene",
-                [](const CommonOptions&) -> nlohmann::json { throw InputError("check: not built yet"); });
+  const auto path = std::make_shared<fs::path>();
+  CLI::App* command = AddSubcommand(app, "check", "says what is wrong with a sequence, a mesh or a scene",
+                                    [path](const CommonOptions& options) { return Run(*path, options); });
+  command->add_option("path", *path, "a sequence's folder, a mesh or a TOML file")->required();
 }
 
 }  // namespace lumen
