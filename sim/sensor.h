@@ -14,7 +14,7 @@ namespace lumen {
 // Automatic brightness: a damped loop on the logarithm of the gain that follows what the frame before called for.
 struct AutoGain {
   double target = 0.4;         // encoded brightness that it aims at
-  double settling_s = 0.4;     // until within 2% of a step
+  double settling_s = 0.4;     // until within 2% of a step, for damping up to 0.8; above that slower
   double damping = 0.6;
   double frame_rate_hz = 29.97;
 };
