@@ -6,6 +6,7 @@
 
 #include "common/config.h"
 #include "common/math.h"
+#include "common/random.h"
 
 namespace lumen {
 

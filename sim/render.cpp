@@ -1,0 +1,229 @@
+#include "sim/render.h"
+
+#include <algorithm>
+#include <chrono>
+#include <regex>
+
+#include "common/error.h"
+#include "common/files.h"
+#include "common/parallel.h"
+#include "common/progress.h"
+#include "sim/ground_truth.h"
+
+namespace lumen {
+namespace {
+
+// The automatic gain meters every frame on a small picture of it, so that a frame's gain doesn't depend on which
+// frames are rendered. Its random numbers are its own.
+constexpr int kMeterReduction = 8;
+constexpr int kMeterSamples = 4;
+constexpr uint64_t kMeterSeed = 0x6d65746572ull;
+constexpr uint64_t kSurfaceSeed = 0x77616c6cull;
+
+class Renderer {
+ public:
+  Renderer(const Scene& scene, const RenderOptions& options)
+      : scene_(scene),
+        options_(options),
+        wall_(scene.geometry.mesh),
+        path_scene_{&wall_, &scene.surface, RandomBits(options.seed, kSurfaceSeed)},
+        camera_(scene.calibration.camera),
+        fast_camera_(scene.calibration.camera),
+        valid_(ValidPixels(scene.calibration)) {
+    if (std::none_of(valid_.data.begin(), valid_.data.end(), [](uint8_t v) { return v != 0; })) {
+      throw InputError("camera.mask: no pixel is left");
+    }
+    const int count = static_cast<int>(scene.world_from_camera.size());
+    last_ = options.last_frame < 0 ? count : options.last_frame;
+    if (options.first_frame < 0 || options.first_frame >= last_ || last_ > count) {
+      throw InputError("--frames " + std::to_string(options.first_frame) + ":" + std::to_string(last_) +
+                       ": the scene has frames 0:" + std::to_string(count));
+    }
+  }
+
+  RenderResult Run() {
+    const auto start = std::chrono::steady_clock::now();
+    Progress progress("render");
+    CreateFolder(options_.folder);
+    if (!scene_.truth.exact.empty()) CreateFolder(options_.folder / "exact");
+    const std::vector<double> gains = Gains();
+    const ImageF vignetting = VignettingMap(scene_.calibration.response, camera_);
+    for (int frame = options_.first_frame; frame < last_; ++frame) {
+      RenderOne(frame, gains[frame], vignetting);
+      progress.Update(double(frame + 1 - options_.first_frame) / (last_ - options_.first_frame));
+    }
+    WriteSequence(gains);
+    result_.frames = last_ - options_.first_frame;
+    result_.effects = scene_.effects;
+    result_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    return result_;
+  }
+
+ private:
+  bool Wants(const std::string& channel) const {
+    return std::find(scene_.truth.exact.begin(), scene_.truth.exact.end(), channel) != scene_.truth.exact.end();
+  }
+
+  View ViewOf(int frame, const Camera<float>& camera, const Image8& valid) const {
+    return {&camera, &valid, scene_.world_from_camera[frame], &scene_.calibration.light};
+  }
+
+  std::vector<double> Gains() const {
+    if (!scene_.sensor.auto_gain) return std::vector<double>(scene_.world_from_camera.size(), scene_.sensor.gain);
+    Calibration small = scene_.calibration;
+    small.camera = Resized(small.camera, std::max(1, small.camera.width / kMeterReduction),
+                           std::max(1, small.camera.height / kMeterReduction));
+    small.mask = {};
+    const Camera<double> camera(small.camera);
+    const Camera<float> fast_camera(small.camera);
+    const Image8 valid = ValidPixels(small);
+    PathOptions path = scene_.path;
+    path.samples = kMeterSamples;
+    std::vector<double> brightness;
+    for (int frame = 0; frame < last_; ++frame) {
+      Film film;
+      RenderFrame(path_scene_, ViewOf(frame, fast_camera, valid), path, RandomBits(options_.seed, kMeterSeed), frame,
+                  false, &film);
+      brightness.push_back(MeterBrightness(scene_.calibration.response, film.radiance, valid, camera));
+    }
+    return RunAutoGain(*scene_.sensor.auto_gain, scene_.calibration.response, brightness);
+  }
+
+  void RenderOne(int frame, double gain, const ImageF& vignetting) {
+    Film film;
+    const PathCount count = RenderFrame(path_scene_, ViewOf(frame, fast_camera_, valid_), scene_.path, options_.seed,
+                                        frame, Wants("direct") || Wants("indirect"), &film);
+    result_.samples += count.samples;
+    result_.rays += count.rays;
+    NoteFailure(frame, count.failure);
+    const Image8 color = Develop(scene_.calibration.response, gain, film.radiance, vignetting, valid_);
+    WriteImage(FrameFile(options_.folder, frame, "color.png"), color);
+    if (scene_.truth.c3vd || !scene_.truth.exact.empty()) {
+      const Pose* previous = frame > 0 ? &scene_.world_from_camera[frame - 1] : nullptr;
+      const FrameTruth truth = ComputeTruth(wall_, camera_, valid_, scene_.world_from_camera[frame], previous);
+      if (scene_.truth.c3vd) WriteC3vd(frame, truth);
+      if (!scene_.truth.exact.empty()) WriteExact(frame, film, truth);
+    }
+  }
+
+  void NoteFailure(int frame, const Failure& failure) {
+    if (failure.count > 0 && result_.not_finite == 0) {
+      result_.first_not_finite = "frame " + std::to_string(frame) + ", pixel (" + std::to_string(failure.x) + ", " +
+                                 std::to_string(failure.y) + "), sample " + std::to_string(failure.sample) +
+                                 "; replay it with --frames " + std::to_string(frame) + ":" +
+                                 std::to_string(frame + 1) + " --seed " + std::to_string(options_.seed);
+    }
+    result_.not_finite += failure.count;
+  }
+
+  void WriteC3vd(int frame, const FrameTruth& truth) const {
+    WriteImage(FrameFile(options_.folder, frame, "depth.tiff"), EncodeDepth(truth.z));
+    WriteImage(FrameFile(options_.folder, frame, "normals.tiff"), EncodeNormals(truth.normal));
+    WriteImage(FrameFile(options_.folder, frame, "occlusion.png"), truth.occlusion);
+    if (!truth.flow.empty()) WriteImage(FrameFile(options_.folder, frame, "flow.tiff"), EncodeFlow(truth.flow));
+  }
+
+  ImageF AlbedoMap(const FrameTruth& truth) const {
+    ImageF albedo(truth.position.width, truth.position.height, 3, std::numeric_limits<float>::quiet_NaN());
+    ParallelFor(0, albedo.height, [&](int64_t y) {
+      for (int x = 0; x < albedo.width; ++x) {
+        const float* p = truth.position.Pixel(x, static_cast<int>(y));
+        if (std::isnan(p[0])) continue;
+        const Vec3f value = AlbedoAt(scene_.surface, path_scene_.surface_seed, wall_.ToLocal(Vec3d(p[0], p[1], p[2])));
+        std::copy(value.data(), value.data() + 3, albedo.Pixel(x, static_cast<int>(y)));
+      }
+    });
+    return albedo;
+  }
+
+  void WriteExact(int frame, const Film& film, const FrameTruth& truth) const {
+    std::vector<std::string> names;
+    std::vector<ImageF> images;
+    auto add = [&](const std::string& name, const ImageF& image, const std::vector<std::string>& parts) {
+      if (!Wants(name) || image.empty()) return;
+      for (const std::string& part : parts) names.push_back(part.empty() ? name : name + "." + part);
+      images.push_back(image);
+    };
+    const std::vector<std::string> rgb = {"R", "G", "B"}, xyz = {"X", "Y", "Z"}, one = {""};
+    add("radiance", film.radiance, rgb);
+    add("direct", film.direct, rgb);
+    add("indirect", film.indirect, rgb);
+    if (Wants("albedo")) add("albedo", AlbedoMap(truth), rgb);
+    add("z", truth.z, one);
+    add("distance", truth.distance, one);
+    add("normal", truth.normal, xyz);
+    add("position", truth.position, xyz);
+    add("flow", truth.flow, {"X", "Y"});
+    add("seen_before", truth.seen_before, one);
+    ImageF all(truth.z.width, truth.z.height, static_cast<int>(names.size()));
+    int channel = 0;
+    for (const ImageF& image : images) {
+      for (size_t pixel = 0; pixel < size_t(all.width) * all.height; ++pixel) {
+        std::copy_n(&image.data[pixel * image.channels], image.channels, &all.data[pixel * all.channels + channel]);
+      }
+      channel += image.channels;
+    }
+    if (all.channels > 0) WriteExr(options_.folder / "exact" / ExactName(frame), all, names);
+  }
+
+  static std::string ExactName(int frame) {
+    char name[32];
+    std::snprintf(name, sizeof(name), "%04d.exr", frame);
+    return name;
+  }
+
+  void WriteSequence(const std::vector<double>& gains) const {
+    RemoveStaleFrames();
+    const Mesh& mesh = scene_.geometry.mesh;
+    std::vector<uint8_t> seen(mesh.faces.size(), 0);
+    Sequence sequence;
+    sequence.folder = options_.folder;
+    sequence.has_toml = true;
+    sequence.calibration = scene_.calibration;
+    for (int frame = options_.first_frame; frame < last_; ++frame) {
+      SequenceFrame entry;
+      entry.number = frame;
+      entry.world_from_camera = scene_.world_from_camera[frame];
+      if (scene_.sensor.record_gain) entry.gain = gains[frame];
+      sequence.frames.push_back(entry);
+      MarkObserved(wall_, camera_, valid_, entry.world_from_camera, &seen);
+    }
+    WriteCoverageMesh(options_.folder / "coverage_mesh.obj", mesh, std::vector<bool>(seen.begin(), seen.end()));
+    sequence.ground_truth_mesh = options_.folder / "mesh.ply";
+    WriteMesh(sequence.ground_truth_mesh, mesh);
+    WriteSequenceHeader(sequence);
+  }
+
+  // An earlier sequence in the folder may have had more frames, or others: they would be taken for this one's.
+  void RemoveStaleFrames() const {
+    static const std::regex kFrameFile(R"((\d{4,})(_(color|occlusion)\.png|_(depth|normals|flow)\.tiff|\.exr))");
+    for (const auto& folder : {options_.folder, options_.folder / "exact"}) {
+      if (!std::filesystem::is_directory(folder)) continue;
+      std::vector<std::filesystem::path> stale;
+      for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+        std::smatch match;
+        const std::string name = entry.path().filename().string();
+        if (!std::regex_match(name, match, kFrameFile)) continue;
+        const int number = std::stoi(match[1]);
+        if (number < options_.first_frame || number >= last_) stale.push_back(entry.path());
+      }
+      for (const auto& path : stale) std::filesystem::remove(path);
+    }
+  }
+
+  const Scene& scene_;
+  RenderOptions options_;
+  RayScene wall_;
+  PathScene path_scene_;
+  Camera<double> camera_;
+  Camera<float> fast_camera_;
+  Image8 valid_;
+  int last_;
+  RenderResult result_;
+};
+
+}  // namespace
+
+RenderResult Render(const Scene& scene, const RenderOptions& options) { return Renderer(scene, options).Run(); }
+
+}  // namespace lumen

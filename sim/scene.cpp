@@ -1,0 +1,147 @@
+#include "sim/scene.h"
+
+#include <algorithm>
+
+#include "common/calibration.h"
+#include "common/config.h"
+#include "common/error.h"
+#include "common/random.h"
+#include "sim/trajectory.h"
+
+namespace lumen {
+namespace {
+
+constexpr Range kImageSide{1, 32768};
+
+// Seeds of the parts of a scene, so that none repeats another's numbers.
+enum : uint64_t { kGeometrySeed = 1, kTrajectorySeed = 2 };
+
+CameraIntrinsics ReadSceneCamera(const ConfigTable& table) {
+  if (!table.Has("preset")) return ReadCamera(table);
+  const std::string preset = table.Choice("preset", {"c3vd", "endomapper"});
+  const CameraIntrinsics camera = preset == "c3vd" ? C3vdIntrinsics() : EndomapperIntrinsics();
+  const int width = static_cast<int>(table.Integer("width", camera.width, kImageSide));
+  const int height = static_cast<int>(table.Integer("height", camera.height, kImageSide));
+  if (width == camera.width && height == camera.height) return camera;
+  try {
+    return Resized(camera, width, height);
+  } catch (const InputError& error) {
+    table.Fail("width", error.what());
+  }
+}
+
+// The octagon that C3VD's scope shows, in parts of the image: its corners are cut off along the lines from 15.04% of
+// the width to 23.29% of the height (measured on the data set's official mask, 1350×1080, to half a pixel).
+Image8 OctagonMask(int width, int height) {
+  constexpr double kCutX = 203.0 / 1350, kCutY = 251.5 / 1080;
+  Image8 mask(width, height, 1);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const double left = (x + 0.5) / width, top = (y + 0.5) / height;
+      const double dx = std::min(left, 1 - left) / kCutX, dy = std::min(top, 1 - top) / kCutY;
+      *mask.Pixel(x, y) = dx + dy >= 1 ? 255 : 0;
+    }
+  }
+  return mask;
+}
+
+Image8 ReadMask(const ConfigTable& table, const CameraIntrinsics& camera) {
+  if (!table.Has("mask")) return {};
+  if (table.String("mask") == "octagon") return OctagonMask(camera.width, camera.height);
+  const Image8 mask = ReadImage8(table.Path("mask"), 1);
+  if (mask.width == camera.width && mask.height == camera.height) return mask;
+  // The nearest pixel of a mask of another size: it is drawn for the camera at its full one.
+  Image8 resized(camera.width, camera.height, 1);
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
+      *resized.Pixel(x, y) = *mask.Pixel(static_cast<int>((x + 0.5) * mask.width / camera.width),
+                                         static_cast<int>((y + 0.5) * mask.height / camera.height));
+    }
+  }
+  return resized;
+}
+
+PathOptions ReadPath(const ConfigTable& table) {
+  PathOptions path;
+  path.samples = static_cast<int>(table.Integer("samples", path.samples, {1, 1 << 24}));
+  path.bounces = static_cast<int>(table.Integer("bounces", path.bounces, {0, 10000}));
+  path.roulette_after = static_cast<int>(table.Integer("roulette_after", path.roulette_after, {0, 10000}));
+  return path;
+}
+
+TruthOptions ReadTruth(const ConfigTable& table) {
+  TruthOptions truth;
+  truth.c3vd = table.Flag("c3vd", truth.c3vd);
+  if (!table.Has("exact")) return truth;
+  truth.exact = table.Strings("exact");
+  for (const std::string& name : truth.exact) {
+    if (std::find(ExactChannels().begin(), ExactChannels().end(), name) != ExactChannels().end()) continue;
+    std::string known;
+    for (const std::string& channel : ExactChannels()) known += (known.empty() ? "" : ", ") + channel;
+    table.Fail("exact", "no channel \"" + name + "\"; there are: " + known);
+  }
+  return truth;
+}
+
+std::vector<std::string> NameEffects(const Scene& scene) {
+  std::vector<std::string> effects;
+  if (scene.path.bounces > 0) effects.push_back("interreflection");
+  if (scene.surface.mottling) effects.push_back("mottling");
+  if (scene.surface.vessels) effects.push_back("vessels");
+  const auto& sources = scene.calibration.light.sources;
+  if (std::any_of(sources.begin(), sources.end(), [](const auto& s) { return !s.position.isZero(0); })) {
+    effects.push_back("offset_guides");
+  }
+  if (scene.calibration.response.vignetting > 0) effects.push_back("vignetting");
+  if (scene.sensor.auto_gain) effects.push_back("auto_gain");
+  if (!scene.calibration.mask.empty()) effects.push_back("mask");
+  return effects;
+}
+
+// A guide in the wall would light it from within.
+void CheckLightInLumen(const Scene& scene, const std::filesystem::path& file) {
+  const RayScene wall(scene.geometry.mesh);
+  for (size_t frame = 0; frame < scene.world_from_camera.size(); ++frame) {
+    const Pose& pose = scene.world_from_camera[frame];
+    for (const LightSource& source : scene.calibration.light.sources) {
+      if (source.position.isZero(0)) continue;
+      const Vec3f from = wall.ToLocal(pose.translation());
+      if (wall.Occluded(from, wall.ToLocal(pose * source.position) - from, 0, 1)) {
+        throw InputError(file.string() + ": frame " + std::to_string(frame) + ": a light source lies behind the wall; " +
+                         "keep the camera farther from it (trajectory.clearance_mm)");
+      }
+    }
+  }
+}
+
+}  // namespace
+
+const std::vector<std::string>& ExactChannels() {
+  static const std::vector<std::string> channels = {"radiance", "direct",   "indirect", "albedo", "z",
+                                                    "distance", "normal",   "position", "flow",   "seen_before"};
+  return channels;
+}
+
+Scene ReadScene(const std::filesystem::path& file, const std::vector<std::string>& settings, uint64_t seed) {
+  const Config config = Config::Read(file, settings);
+  const ConfigTable root = config.root();
+  Scene scene;
+  const ConfigTable camera = root.Table("camera");
+  scene.calibration.camera = ReadSceneCamera(camera);
+  scene.calibration.mask = ReadMask(camera, scene.calibration.camera);
+  scene.calibration.light = ReadLight(root.Table("light"));
+  scene.calibration.response = ReadResponse(root.Table("response"));
+  scene.surface = ReadSurface(root.Table("surface"));
+  if (const auto path = root.Optional("path")) scene.path = ReadPath(*path);
+  if (const auto sensor = root.Optional("sensor")) scene.sensor = ReadSensor(*sensor);
+  if (const auto truth = root.Optional("truth")) scene.truth = ReadTruth(*truth);
+  scene.geometry = BuildGeometry(root.Table("geometry"), RandomBits(seed, kGeometrySeed));
+  scene.world_from_camera =
+      BuildTrajectory(root.Table("trajectory"), scene.geometry, RandomBits(seed, kTrajectorySeed));
+  config.RejectUnknown();
+  CheckLightInLumen(scene, file);
+  scene.effects = NameEffects(scene);
+  return scene;
+}
+
+}  // namespace lumen
