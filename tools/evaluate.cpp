@@ -1,11 +1,49 @@
-#include "common/error.h"
+#include "recon/evaluate.h"
+
+#include <iostream>
+
+#include "common/files.h"
+#include "common/progress.h"
+#include "recon/evaluation_json.h"
+#include "recon/evaluation_table.h"
+#include "recon/sheet.h"
 #include "tools/options.h"
 
 namespace lumen {
+namespace {
+
+struct Arguments {
+  std::filesystem::path mesh, sequence, folder;
+};
+
+nlohmann::json Run(const Arguments& arguments, const CommonOptions& common) {
+  const Sequence sequence = ReadSequence(arguments.sequence);
+  const Mesh reconstruction = ReadMesh(arguments.mesh);
+  RequireSurface(reconstruction, arguments.mesh.string());
+  const Mesh truth = ReadGroundTruth(sequence);
+  EvaluateOptions options;
+  options.seed = common.seed;
+  const Evaluation evaluation = Evaluate(reconstruction, truth, sequence, options);
+  const nlohmann::json result = ToJson(evaluation);
+  std::cout << ToTable(evaluation);
+  if (!arguments.folder.empty()) {
+    WriteEvaluationPictures(evaluation, reconstruction, truth, sequence, arguments.folder);
+    WriteFile(arguments.folder / "evaluation.json", result.dump(2) + "\n");
+    Say("pictures in " + arguments.folder.string());
+  }
+  return result;
+}
+
+}  // namespace
 
 void AddEvaluate(CLI::App* app) {
-  AddSubcommand(app, "evaluate", "measures a reconstruction against the truth",
-                [](const CommonOptions&) -> nlohmann::json { throw InputError("evaluate: not built yet"); });
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App* command = AddSubcommand(app, "evaluate", "measures a reconstruction against the truth",
+                                    [=](const CommonOptions& common) { return Run(*arguments, common); });
+  command->add_option("MESH", arguments->mesh, "the reconstruction (PLY, OBJ, OFF, STL; mm, world axes)")
+      ->required();
+  command->add_option("SEQ", arguments->sequence, "the sequence folder with its ground truth")->required();
+  command->add_option("-o,--output", arguments->folder, "folder for the coloured meshes and pictures");
 }
 
 }  // namespace lumen
