@@ -22,7 +22,6 @@ constexpr Rgb8 kBlack = {0, 0, 0};
 // Everything that several pictures show.
 struct Subjects {
   const Sequence& sequence;
-  const Evaluation& evaluation;
   Portrait truth, reconstruction;
   std::vector<Rgb8> truth_plain, truth_views, reconstruction_plain, reconstruction_error;
 };
@@ -85,9 +84,7 @@ Image8 Sheet(const Subjects& subjects, const View& outside, int height) {
   const Sequence& sequence = subjects.sequence;
   const int count = static_cast<int>(sequence.frames.size());
   std::vector<Panel> panels;
-  const std::vector<int> first_two = {0, count / 2};
-  const int deepest = DeepestFrame(sequence, first_two);
-  for (int frame : {0, count / 2, deepest}) {
+  for (int frame : {0, count / 2, DeepestFrame(sequence, {0, count / 2})}) {
     const View view = WithinView(sequence, frame, height);
     const std::string number = "frame " + std::to_string(sequence.frames[frame].number);
     panels.push_back({number + ": input", InputPanel(sequence, frame, view.camera.width, height)});
@@ -117,7 +114,6 @@ void WriteEvaluationPictures(const Evaluation& evaluation, const Mesh& reconstru
   const std::vector<int> truth_seen = SeeVertices(RayScene(truth), FrameViews(sequence)).frames_seeing;
   const Subjects subjects = {
       .sequence = sequence,
-      .evaluation = evaluation,
       .truth = Portrait(truth),
       .reconstruction = Portrait(reconstruction),
       .truth_plain = std::vector<Rgb8>(truth.vertices.size(), kTissue),

@@ -199,7 +199,8 @@ TEST(Evaluate, JsonHasTheDocumentedKeys) {
   const nlohmann::json json =
       ToJson(Evaluate(test::Cube(19, 4), test::Cube(20, 4), test::PinholeSequence({At(0, 0, 0)})));
   std::set<std::string> keys;
-  for (const auto& [key, value] : json.flatten().items()) keys.insert(key);
+  const nlohmann::json flat = json.flatten();
+  for (const auto& [key, value] : flat.items()) keys.insert(key);
   const std::set<std::string> expected = {"/surveyed/medae_mm",
                                           "/surveyed/mae_mm",
                                           "/surveyed/rmse_mm",

@@ -65,7 +65,7 @@ TEST(PointMeshDistance, MatchesBruteForce) {
   const PointMeshDistance distance(mesh);
   int regions[3] = {};
   for (int i = 0; i < 2000; ++i) {
-    const Vec3d point = RandomVector(9, i, 80);
+    const Vec3d point = RandomVector(9, i, 60);
     long double expected = std::numeric_limits<long double>::infinity();
     int closest_region = 0;
     for (const Vec3i& face : mesh.faces) {
