@@ -42,6 +42,10 @@ bool Clearance::Encloses(const Vec3d& place) const {
   return std::abs(solid_angle) > 2 * kPi;  // ±4π inside, 0 outside
 }
 
+double ClearanceKey(const ConfigTable& trajectory) {
+  return trajectory.Number("clearance_mm", 3, kNotNegative);
+}
+
 Vec3d NearestPointOfTriangle(const Vec3d& p, const Vec3d& a, const Vec3d& b, const Vec3d& c) {
   const Vec3d ab = b - a, ac = c - a, ap = p - a;
   const double d1 = ab.dot(ap), d2 = ac.dot(ap);

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "common/config.h"
 #include "common/mesh.h"
 
 namespace lumen {
@@ -32,6 +33,9 @@ class Clearance {
   const Mesh& mesh_;
   std::vector<Ball> balls_;  // around each face
 };
+
+// The clearance_mm of a scene's [trajectory]: how near to the wall a camera may come; 3 mm by default.
+double ClearanceKey(const ConfigTable& trajectory);
 
 // The point of the triangle abc that is nearest to p (Ericson, Real-Time Collision Detection, 5.1.5).
 Vec3d NearestPointOfTriangle(const Vec3d& p, const Vec3d& a, const Vec3d& b, const Vec3d& c);
