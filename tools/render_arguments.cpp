@@ -1,0 +1,47 @@
+#include "tools/render_arguments.h"
+
+#include <iostream>
+
+#include "common/error.h"
+
+namespace lumen {
+namespace {
+
+void ReadFrameRange(const std::string& text, RenderOptions* options) {
+  if (text.empty()) return;
+  int end = 0;
+  char colon = 0;
+  std::istringstream in(text);
+  if (!(in >> options->first_frame >> colon >> end) || colon != ':' || !in.eof() || end <= options->first_frame) {
+    throw InputError("--frames " + text + ": give the first frame and the one after the last, as in 0:20");
+  }
+  options->last_frame = end;
+}
+
+}  // namespace
+
+void AddRenderArguments(CLI::App* command, RenderArguments* arguments) {
+  command->add_option("scene", arguments->scene, "scene file (see scenes/README.md)")->required();
+  command->add_option("--frames", arguments->frames, "render frames A to B−1 only: A:B");
+  command->add_option("--set", arguments->settings, "a key of the scene: path.to.key=value");
+}
+
+RenderResult RunRender(const RenderArguments& arguments, uint64_t seed, const std::filesystem::path& folder) {
+  RenderOptions options;
+  options.folder = folder;
+  options.seed = seed;
+  ReadFrameRange(arguments.frames, &options);
+  const RenderResult result = Render(ReadScene(arguments.scene, arguments.settings, seed), options);
+  if (result.not_finite > 0) {
+    std::cerr << "lumen: " << result.not_finite << " samples were not finite and are left out; the first: "
+              << result.first_not_finite << "\n";
+  }
+  return result;
+}
+
+nlohmann::json ToJson(const RenderResult& result) {
+  return {{"seconds", result.seconds}, {"frames", result.frames},         {"samples", result.samples},
+          {"rays", result.rays},       {"not_finite", result.not_finite}, {"effects", result.effects}};
+}
+
+}  // namespace lumen
