@@ -1,22 +1,12 @@
 #include "common/config.h"
 
-#include "common/error.h"
 #include "common/files.h"
 #include "tests/support.h"
 
 namespace lumen {
 namespace {
 
-// The message of the InputError that the body throws; empty where it throws none.
-template <class Body>
-std::string ErrorOf(const Body& body) {
-  try {
-    body();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
+using test::ErrorOf;
 
 constexpr char kText[] = R"(title = "a test"
 [camera]

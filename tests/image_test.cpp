@@ -2,22 +2,13 @@
 
 #include <cmath>
 
-#include "common/error.h"
 #include "common/files.h"
 #include "tests/support.h"
 
 namespace lumen {
 namespace {
 
-template <class Body>
-std::string ErrorOf(const Body& body) {
-  try {
-    body();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
+using test::ErrorOf;
 
 // Values that use every bit, differ between channels and rows.
 template <class T>

@@ -3,22 +3,13 @@
 #include <cmath>
 #include <cstring>
 
-#include "common/error.h"
 #include "common/files.h"
 #include "tests/support.h"
 
 namespace lumen {
 namespace {
 
-template <class Body>
-std::string ErrorOf(const Body& body) {
-  try {
-    body();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
+using test::ErrorOf;
 
 // Reads `text` as a file of that name; answers the error without its folder.
 std::string ErrorReading(const std::string& name, const std::string& text) {

@@ -2,7 +2,6 @@
 
 #include <cmath>
 
-#include "common/error.h"
 #include "common/files.h"
 #include "common/pose_file.h"
 #include "tests/support.h"
@@ -11,18 +10,9 @@ namespace lumen {
 namespace {
 
 namespace fs = std::filesystem;
+using test::ErrorOf;
 using test::ScratchFolder;
 using test::SharedData;
-
-template <class Body>
-std::string ErrorOf(const Body& body) {
-  try {
-    body();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
 
 // The error of reading a folder, without the folder's own name.
 std::string ErrorReading(const ScratchFolder& scratch) {

@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <string>
 
+#include "common/error.h"
+
 namespace lumen::test {
 
 // A file or folder of the shared data (real frame, trajectories, CT colon), which is not part of the project.
@@ -17,6 +19,17 @@ std::filesystem::path SharedData(const std::string& relative);
   if (!std::filesystem::exists(SharedData(relative))) {   \
     GTEST_SKIP() << "no " << SharedData(relative);        \
   }
+
+// The message of the InputError that the body throws; empty where it throws none.
+template <class Body>
+std::string ErrorOf(const Body& body) {
+  try {
+    body();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
 
 // An empty folder of the test's own, removed at the end of the scope.
 class ScratchFolder {
