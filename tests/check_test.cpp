@@ -275,6 +275,49 @@ TEST(CheckRealFrame, FlowAgreesWithDepthAndTrajectory) {
   ExpectError(scratch.path(), "frame 10: flow is off by");
 }
 
+constexpr char kScene[] = R"([camera]
+preset = "c3vd"
+[light]
+model = "sls"
+[[light.source]]
+position = [0, 0, 25]
+direction = [0, 0, 1]
+spread = 1
+intensity = [3600, 3600, 3600]
+[response]
+gamma = 2.2
+[surface]
+[geometry]
+kind = "colon"
+segment = "transverse"
+length_mm = 60
+tolerance_mm = 0.2
+[trajectory]
+kind = "withdrawal"
+frames = 4
+start_mm = 30
+end_mm = 10
+)";
+
+TEST(CheckScene, AGoodOneHasNoErrorsAndOddThingsAreWarnings) {
+  const ScratchFolder scratch;
+  WriteFile(scratch / "scene.toml", kScene);
+  const Outcome outcome = Check(scratch / "scene.toml");
+  EXPECT_EQ(outcome.exit_code, 0) << outcome.err;
+  EXPECT_EQ(outcome.json["scene"]["frames"], 4);
+  EXPECT_EQ(outcome.json["scene"]["geometry"]["closed"], true);
+  EXPECT_NE(outcome.out.find("warning: light.source.0: lies 25.0 mm from the camera"), std::string::npos);
+}
+
+TEST(CheckScene, MistakesAreNamedWithTheirPlace) {
+  const ScratchFolder scratch;
+  WriteFile(scratch / "scene.toml", std::string(kScene) + "wobbel_mm = 1\n");
+  ExpectError(scratch / "scene.toml",
+              "scene.toml:23: trajectory.wobbel_mm: unknown key; is \"wobble_mm\" meant?");
+  WriteFile(scratch / "scene.toml", "[camera]\npreset = \"fish\"\n");
+  ExpectError(scratch / "scene.toml", "scene.toml:2: camera.preset: is \"fish\", but must be one of: ");
+}
+
 TEST(CheckUsage, WithoutAPathItIsUsage) {
   const std::string command = std::string(LUMEN_COMMAND) + " check >/dev/null 2>&1";
   EXPECT_EQ(WEXITSTATUS(std::system(command.c_str())), 2);

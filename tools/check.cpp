@@ -24,7 +24,7 @@ Subject SubjectOf(const fs::path& path) {
 }
 
 // What can't be read at all is a finding as well.
-nlohmann::json Check(const fs::path& path, Findings* findings) {
+nlohmann::json Check(const fs::path& path, uint64_t seed, Findings* findings) {
   try {
     switch (SubjectOf(path)) {
       case Subject::kSequence: {
@@ -34,7 +34,7 @@ nlohmann::json Check(const fs::path& path, Findings* findings) {
       case Subject::kMesh:
         return {{"mesh", CheckMesh(path.string(), ReadMesh(path), findings)}};
       case Subject::kScene:
-        throw InputError(path.string() + ": scenes can't be checked yet");
+        return {{"scene", CheckScene(ReadScene(path, {}, seed), findings)}};
     }
   } catch (const InputError& error) {
     findings->Error(error.what());
@@ -44,7 +44,7 @@ nlohmann::json Check(const fs::path& path, Findings* findings) {
 
 nlohmann::json Run(const fs::path& path, const CommonOptions& options) {
   Findings findings;
-  nlohmann::json result = Check(path, &findings);
+  nlohmann::json result = Check(path, options.seed, &findings);
   result["findings"] = nlohmann::json::array();
   for (const Finding& finding : findings.all()) {
     const char* severity = finding.severity == Finding::Severity::kError ? "error" : "warning";

@@ -17,8 +17,6 @@ namespace {
 constexpr double kToleratedPart = 0.02;
 // Off unit length: what normals decoded from 8 bits are off at most, √3/255, and as much again.
 constexpr double kNormalTolerance = 0.015;
-// A light guide lies in the endoscope's tip, some 6 mm in radius.
-constexpr double kFarthestLight_mm = 20;
 // Every so many pixels are compared with other data.
 constexpr int kStride_px = 16;
 // Half the width of the stencil that estimates normals from depths: wide enough for depth steps of 0.4 mm.
@@ -41,54 +39,6 @@ struct FrameContext {
     return fmt::format("frame {}: {}", frame.number, problem);
   }
 };
-
-double Median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
-void CheckLight(const Light& light, Findings* findings) {
-  for (size_t i = 0; i < light.sources.size(); ++i) {
-    const LightSource& source = light.sources[i];
-    if (source.position.norm() > kFarthestLight_mm) {
-      findings->Warn(
-          fmt::format("light.source.{}: lies {:.1f} mm from the camera, outside any endoscope's tip", i,
-                      source.position.norm()));
-    }
-    if (source.direction.z() <= 0) {
-      findings->Warn(fmt::format("light.source.{}: shines backwards, away from what the camera sees", i));
-    }
-  }
-}
-
-// Steps far larger than what is usual in the sequence. Withdrawal makes 0.13 mm a frame, C3VD's poses up to 5
-// mm.
-void CheckPoses(const std::vector<SequenceFrame>& frames, Findings* findings) {
-  std::vector<double> steps_mm, turns_rad;
-  for (size_t i = 1; i < frames.size(); ++i) {
-    const Pose motion = frames[i - 1].world_from_camera.inverse() * frames[i].world_from_camera;
-    const int numbers = std::max(1, frames[i].number - frames[i - 1].number);
-    steps_mm.push_back(motion.translation().norm() / numbers);
-    const double cosine = (motion.linear().trace() - 1) / 2;
-    turns_rad.push_back(std::acos(std::clamp(cosine, -1.0, 1.0)) / numbers);
-  }
-  if (steps_mm.empty()) return;
-  const double usual_mm = Median(steps_mm), usual_rad = Median(turns_rad);
-  if (*std::ranges::max_element(steps_mm) == 0) findings->Warn("poses: the camera never moves");
-  for (size_t i = 0; i < steps_mm.size(); ++i) {
-    if (steps_mm[i] > std::max(10 * usual_mm, 2.0)) {
-      findings->Warn(
-          fmt::format("poses: from frame {} to {} the camera jumps by {:.1f} mm a frame (usual: {:.2f})",
-                      frames[i].number, frames[i + 1].number, steps_mm[i], usual_mm));
-    }
-    if (turns_rad[i] > std::max(10 * usual_rad, 0.1)) {
-      findings->Warn(fmt::format(
-          "poses: from frame {} to {} the camera turns by {:.0f}° a frame (usual: {:.1f}°)", frames[i].number,
-          frames[i + 1].number, turns_rad[i] * 180 / kPi, usual_rad * 180 / kPi));
-    }
-  }
-}
 
 // Reads one file by `read`; what is wrong with it becomes a finding and the image stays empty.
 template <class Read>

@@ -8,6 +8,7 @@
 
 #include "common/mesh.h"
 #include "common/sequence.h"
+#include "sim/scene.h"
 
 namespace lumen {
 
@@ -37,5 +38,17 @@ nlohmann::json CheckMesh(const std::string& name, const Mesh& mesh, Findings* fi
 // Light, poses and every file of every frame; depth, normals, flow, poses and the ground truth's mesh against
 // each other.
 nlohmann::json CheckSequence(const Sequence& sequence, Findings* findings);
+
+// What a scene renders: its wall, its light, its trajectory.
+nlohmann::json CheckScene(const Scene& scene, Findings* findings);
+
+// Guides that lie outside any endoscope's tip or shine backwards.
+void CheckLight(const Light& light, Findings* findings);
+
+// Steps between frames that are far larger than is usual in the sequence.
+void CheckPoses(const std::vector<SequenceFrame>& frames, Findings* findings);
+
+// Upper median; values must not be empty.
+double Median(std::vector<double> values);
 
 }  // namespace lumen
