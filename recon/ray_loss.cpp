@@ -53,7 +53,7 @@ void RayLoss<T>::SelectActive(const RayBatch<T>& batch, const LossSettings<T>& s
       const T influence = transmittance_[i] * Sigmoid(-settings.sharpness * signed_distance_[i]);
       const bool seen = weight_[i] > settings.weight_threshold || influence > settings.weight_threshold;
       if (!seen && k != batch.rays[r].eikonal_sample) continue;
-      active_.push_back({static_cast<int>(r), k, seen ? weight_[i] : T(0), T(0), {}});
+      active_.push_back({static_cast<int>(r), k, seen ? weight_[i] : T(0), T(0)});
     }
   }
 }
@@ -85,14 +85,14 @@ void RayLoss<T>::ShadeActive(const T* parameters, const RayBatch<T>& batch,
   }
   field_->Color(parameters, &surface_);
   const Panel<T>& output = surface_.color_output();
+  shading_.resize(count);
   for (int i = 0; i < count; ++i) {
-    Active& sample = active_[i];
+    const Active& sample = active_[i];
     if (!(sample.weight > 0)) continue;
     const Vec3<T> point(surface_.positions.At(0, i), surface_.positions.At(1, i), surface_.positions.At(2, i));
     const Vec3<T> normal(surface_.normal.At(0, i), surface_.normal.At(1, i), surface_.normal.At(2, i));
-    sample.shading = Shade(field_->options().reflectance,
-                           Vec3<T>(output.At(0, i), output.At(1, i), output.At(2, i)), normal,
-                           lights[batch.rays[sample.ray].frame], point);
+    shading_[i] = Shade(field_->options().reflectance, Vec3<T>(output.At(0, i), output.At(1, i), output.At(2, i)),
+                        normal, lights[batch.rays[sample.ray].frame], point);
   }
 }
 
@@ -101,8 +101,8 @@ double RayLoss<T>::ComparePixels(const RayBatch<T>& batch, const std::vector<T>&
                                  const LossSettings<T>& settings, T* log_gain_gradient) {
   const bool lit = field_->options().reflectance != Reflectance::kUnlit;
   radiance_delta_.assign(batch.rays.size(), Vec3<T>::Zero());
-  for (const Active& sample : active_) {
-    if (sample.weight > 0) radiance_delta_[sample.ray] += sample.weight * sample.shading.radiance;
+  for (size_t i = 0; i < active_.size(); ++i) {
+    if (active_[i].weight > 0) radiance_delta_[active_[i].ray] += active_[i].weight * shading_[i].radiance;
   }
   double loss = 0;
   const T share = settings.per_ray / 3;
@@ -139,9 +139,10 @@ void RayLoss<T>::BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& 
     const Active& sample = active_[i];
     if (!(sample.weight > 0)) continue;
     const Vec3<T>& delta = radiance_delta_[sample.ray];
-    weight_delta_[size_t(sample.ray) * n + sample.sample] = delta.dot(sample.shading.radiance);
+    weight_delta_[size_t(sample.ray) * n + sample.sample] = delta.dot(shading_[i].radiance);
     for (int c = 0; c < 3; ++c) {
-      T out = delta[c] * sample.weight * sample.shading.by_output[c];
+      T out = delta[c] * sample.weight * shading_[i].by_output[c];
+      // The pull acts on the albedo alone: a weight that depended on it would move the surface to where it is mean.
       if (pulls_albedo) {
         const T log_albedo = surface_.color_output().At(c, i);
         const T share = settings.albedo_weight * settings.per_ray * sample.weight / 3;
@@ -187,13 +188,23 @@ LossTerms RayLoss<T>::Evaluate(const T* parameters, const RayBatch<T>& batch,
       const Vec3<T> normal = gradient / sample.length;
       Vec3<T> by_normal(surface_.normal_delta.At(0, i), surface_.normal_delta.At(1, i),
                         surface_.normal_delta.At(2, i));
-      by_normal += sample.weight * sample.shading.by_normal.transpose() * radiance_delta_[sample.ray];
+      by_normal += sample.weight * shading_[i].by_normal.transpose() * radiance_delta_[sample.ray];
       delta += (by_normal - normal * normal.dot(by_normal)) / sample.length;
     }
     for (int d = 0; d < 3; ++d) surface_.gradient_delta.At(d, i) = delta[d];
   }
   field_->SurfaceBackward(parameters, &surface_, network_gradient);
   return terms;
+}
+
+template <class T>
+T RayLoss<T>::GradientSum() const {
+  T sum = 0;
+  for (const Panel<T>* panel : {&surface_.input_delta, &surface_.scaled_direction, &surface_.sdf.input_gradient}) {
+    for (int tile = 0; tile < panel->tiles(); ++tile)
+      for (int i = 0; i < panel->rows() * kTile; ++i) sum += panel->Tile(tile)[i];
+  }
+  return sum;
 }
 
 template class RayLoss<float>;

@@ -71,13 +71,14 @@ class RayLoss {
   void GridBackward(int level, T* grid_gradient) const {
     field_->GridBackward(level, surface_, static_cast<int>(active_.size()), grid_gradient);
   }
+  // Sum of everything that GridBackward spreads over the grid: not finite if any of it is.
+  T GradientSum() const;
 
  private:
   struct Active {
     int ray, sample;
     T weight;          // of the sample in its ray; 0 if only the eikonal term sees it
     T length;          // of the SDF's gradient
-    Shading<T> shading;
   };
   void FindWeights(const T* parameters, const RayBatch<T>& batch, const LossSettings<T>& settings);
   void SelectActive(const RayBatch<T>& batch, const LossSettings<T>& settings);
@@ -92,6 +93,7 @@ class RayLoss {
   std::vector<T> signed_distance_, transmittance_, weight_, weight_delta_, distance_delta_;  // rays × samples
   std::vector<Vec3<T>> radiance_delta_;                                                      // a ray
   std::vector<Active> active_;
+  std::vector<Shading<T>> shading_;  // an active sample
 };
 
 }  // namespace lumen

@@ -1,0 +1,314 @@
+// Every gradient of the reconstructor against central differences in double, second order included.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "common/random.h"
+#include "recon/ray_loss.h"
+#include "recon/volume.h"
+
+namespace lumen {
+namespace {
+
+double Random(uint64_t& state) { return 2 * UniformDouble(Mix64(state++)) - 1; }
+
+void Fill(Panel<double>* panel, uint64_t& state, double scale = 1) {
+  for (int tile = 0; tile < panel->tiles(); ++tile)
+    for (int i = 0; i < panel->rows() * kTile; ++i) panel->Tile(tile)[i] = scale * Random(state);
+}
+
+double Dot(const Panel<double>& a, const Panel<double>& b) {
+  double sum = 0;
+  for (int tile = 0; tile < a.tiles(); ++tile)
+    for (int i = 0; i < a.rows() * kTile; ++i) sum += a.Tile(tile)[i] * b.Tile(tile)[i];
+  return sum;
+}
+
+// Central difference of f at x, where f has size about 1: steps of 1e-5 leave 1e-10 of truncation (times the third
+// derivative) and 1e-11 of rounding.
+template <class F>
+double Difference(F f, double* x, double step = 1e-5) {
+  const double kept = *x;
+  *x = kept + step;
+  const double above = f();
+  *x = kept - step;
+  const double below = f();
+  *x = kept;
+  return (above - below) / (2 * step);
+}
+
+class MlpGradients : public testing::TestWithParam<MlpShape> {};
+
+// loss = output · A + q · B with random A, B: covers Backward, InputGradient and the second order at once.
+TEST_P(MlpGradients, MatchFiniteDifferences) {
+  const MlpShape shape = GetParam();
+  const Mlp<double> mlp(shape);
+  std::vector<double> parameters(mlp.parameter_count()), gradient(mlp.parameter_count(), 0.0);
+  mlp.Initialise(5, 1, parameters.data());
+  uint64_t state = 11;
+  for (double& p : parameters) p += 0.1 * Random(state);
+  Panel<double> input(shape.inputs, 2), by_output(shape.outputs, 2), by_gradient(shape.inputs, 2), input_delta;
+  Fill(&input, state);
+  Fill(&by_output, state, 0.1);
+  Fill(&by_gradient, state, 0.1);
+  Mlp<double>::Pass pass;
+  auto loss = [&] {
+    mlp.Forward(parameters.data(), input, shape.outputs, Mlp<double>::Keep::kBends, &pass);
+    mlp.InputGradient(parameters.data(), &pass);
+    return Dot(pass.value.back(), by_output) + Dot(pass.input_gradient, by_gradient);
+  };
+  loss();
+  mlp.BackwardSecondOrder(parameters.data(), input, by_output, by_gradient, &pass, gradient.data(), &input_delta);
+  for (size_t i = 0; i < parameters.size(); i += 3) {
+    const double expected = Difference(loss, &parameters[i]);
+    EXPECT_NEAR(gradient[i], expected, 1e-6 * std::max(1.0, std::abs(expected))) << "parameter " << i;
+  }
+  for (int i = 0; i < shape.inputs; ++i) {
+    const double expected = Difference(loss, &input.At(i, 70));
+    EXPECT_NEAR(input_delta.At(i, 70), expected, 1e-6 * std::max(1.0, std::abs(expected))) << "input " << i;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Shapes, MlpGradients,
+                         testing::Values(MlpShape{19, {32}, 16, Activation::kSquareplus},
+                                         MlpShape{5, {7, 6, 5}, 3, Activation::kSquareplus},
+                                         MlpShape{3, {}, 2, Activation::kSquareplus},
+                                         MlpShape{1, {1}, 1, Activation::kSquareplus}));
+
+// ReLU has no second order but must have a right first one.
+TEST(Mlp, ReluFirstOrderMatchesFiniteDifferences) {
+  const Mlp<double> mlp({6, {9, 8}, 3, Activation::kRelu});
+  std::vector<double> parameters(mlp.parameter_count()), gradient(mlp.parameter_count(), 0.0);
+  mlp.Initialise(3, 1, parameters.data());
+  uint64_t state = 1;
+  Panel<double> input(6, 1), by_output(3, 1);
+  Fill(&input, state);
+  Fill(&by_output, state);
+  Mlp<double>::Pass pass;
+  auto loss = [&] {
+    mlp.Forward(parameters.data(), input, 3, Mlp<double>::Keep::kSlopes, &pass);
+    return Dot(pass.value.back(), by_output);
+  };
+  loss();
+  mlp.Backward(parameters.data(), input, by_output, &pass, gradient.data(), nullptr);
+  for (size_t i = 0; i < parameters.size(); ++i) {
+    EXPECT_NEAR(gradient[i], Difference(loss, &parameters[i], 1e-7), 1e-5) << "parameter " << i;
+  }
+}
+
+const Eigen::AlignedBox3d kBox(Vec3d(-20, -20, -20), Vec3d(20, 22, 25));
+
+TEST(Grid, JacobianAndTableGradientsMatchFiniteDifferences) {
+  GridOptions options;
+  options.levels = 4;
+  options.log2_table_size = 8;  // small, so that fine levels are hashed and collide
+  const Grid<double> grid(options, kBox);
+  std::vector<double> tables(grid.parameter_count()), gradient(grid.parameter_count(), 0.0);
+  uint64_t state = 17;
+  for (double& value : tables) value = Random(state);
+  Panel<double> positions(3, 1), encoding(grid.outputs(), 1), jacobian(3 * grid.outputs(), 1);
+  Panel<double> delta(grid.outputs(), 1), pull(grid.outputs(), 1), direction(3, 1), by_jacobian(3 * grid.outputs(), 1);
+  Fill(&positions, state, 19);
+  Fill(&delta, state, 0.1);
+  Fill(&pull, state, 0.1);
+  Fill(&direction, state);
+  for (int d = 0; d < 3; ++d)
+    for (int r = 0; r < grid.outputs(); ++r)
+      for (int s = 0; s < kTile; ++s) by_jacobian.Row(0, d * grid.outputs() + r)[s] = direction.Row(0, d)[s] * pull.Row(0, r)[s];
+  auto loss = [&] {
+    grid.EncodeWithJacobian(tables.data(), positions, &encoding, &jacobian);
+    return Dot(encoding, delta) + Dot(jacobian, by_jacobian);
+  };
+  loss();
+  for (int l = 0; l < grid.levels(); ++l)
+    grid.BackwardSecondOrder(l, positions, delta, pull, direction, kTile, gradient.data());
+  for (size_t i = 0; i < tables.size(); i += 7) {
+    EXPECT_NEAR(gradient[i], Difference(loss, &tables[i], 1e-4), 1e-9) << "entry " << i;  // linear in the tables
+  }
+  const Panel<double> slopes = jacobian;
+  Panel<double> plain(grid.outputs(), 1);
+  for (int d = 0; d < 3; ++d) {
+    for (int r = 0; r < grid.outputs(); ++r) {
+      auto value = [&] {
+        grid.Encode(tables.data(), positions, &plain);
+        return plain.At(r, 9);
+      };
+      const double expected = Difference(value, &positions.At(d, 9), 1e-6);
+      EXPECT_NEAR(slopes.At(d * grid.outputs() + r, 9), expected, 1e-7);
+    }
+  }
+}
+
+// The integral of the density seen by a ray in NeuS's closed form: with f falling linearly through 0, what passes is
+// Φ(s·f_last)/Φ(s·f_first), and the weights add up to the rest.
+TEST(Volume, WeightsTelescope) {
+  const double f[] = {3, 2.2, 1, 0.4, -0.1, -0.5, -2};
+  double transmittance[7], weight[7];
+  for (double sharpness : {0.3, 1.0, 4.4, 50.0}) {
+    RayWeights(7, f, sharpness, transmittance, weight);
+    double sum = 0;
+    for (double w : weight) sum += w;
+    const double passes = std::exp(LogSigmoid(sharpness * -2) - LogSigmoid(sharpness * 3));
+    EXPECT_NEAR(transmittance[6], passes, 1e-14);
+    EXPECT_NEAR(sum, 1 - passes, 1e-14);
+  }
+}
+
+TEST(Volume, GradientMatchesFiniteDifferences) {
+  uint64_t state = 23;
+  for (double sharpness : {0.3, 2.0, 10.0}) {
+    double f[9], by_weight[9], transmittance[9], weight[9], gradient[9];
+    for (int i = 0; i < 9; ++i) {
+      f[i] = 2 - 0.5 * i + 0.6 * Random(state);  // mostly falling, some sections rise
+      by_weight[i] = Random(state);
+    }
+    auto loss = [&] {
+      RayWeights(9, f, sharpness, transmittance, weight);
+      double sum = 0;
+      for (int i = 0; i < 9; ++i) sum += weight[i] * by_weight[i];
+      return sum;
+    };
+    loss();
+    RayWeightsBackward(9, f, sharpness, transmittance, by_weight, gradient);
+    for (int i = 0; i < 9; ++i) EXPECT_NEAR(gradient[i], Difference(loss, &f[i]), 1e-8);
+  }
+}
+
+TEST(Loss, TermsMatchFiniteDifferences) {
+  const double floor = std::pow(0.5 / 255, 2.2);
+  for (double x : {0.0, 0.5 * floor, 2 * floor, 1e-3, 0.4, 3.0}) {
+    auto value = [&] { return Compress(x, 1 / 2.2, floor).value; };
+    EXPECT_NEAR(Compress(x, 1 / 2.2, floor).slope, Difference(value, &x, 1e-3 * std::max(x, floor)),
+                1e-4 * Compress(x, 1 / 2.2, floor).slope);
+  }
+  // The continuation stays below half an 8-bit step, and no slope passes the bound.
+  EXPECT_LT(Compress(0.0, 1 / 2.2, floor).value, 0.5 / 255);
+  const double bound = std::pow(floor, 1 / 2.2 - 1) / 2.2;
+  EXPECT_NEAR(Compress(0.0, 1 / 2.2, floor).slope, bound, 1e-12 * bound);
+  for (double x : {-0.5, -0.05, 0.02, 0.7}) {
+    auto value = [&] { return HuberLoss(x, 0.1).value; };
+    EXPECT_NEAR(HuberLoss(x, 0.1).slope, Difference(value, &x), 1e-9);
+  }
+  Vec3d g(0.3, -0.5, 0.9), slope, unused;
+  EikonalLoss(g, &slope);
+  for (int d = 0; d < 3; ++d) {
+    auto value = [&] { return EikonalLoss(g, &unused); };
+    EXPECT_NEAR(slope[d], Difference(value, &g[d]), 1e-9);
+  }
+}
+
+TEST(Loss, BoundsCountFromOneSideOnly) {
+  EXPECT_EQ(PhotometricLoss(0.9, 0.8, PixelBound::kAtLeast).value, 0);
+  EXPECT_GT(PhotometricLoss(0.7, 0.8, PixelBound::kAtLeast).value, 0);
+  EXPECT_EQ(PhotometricLoss(0.01, 0.02, PixelBound::kAtMost).value, 0);
+  EXPECT_GT(PhotometricLoss(0.03, 0.02, PixelBound::kAtMost).value, 0);
+}
+
+TEST(Shading, DerivativesMatchFiniteDifferences) {
+  FrameLight<double> light;
+  light.sources.push_back({Vec3d(3, 0.5, 0), Vec3d(0, 0, 1), 2.7, Vec3d(900, 800, 700)});
+  light.sources.push_back({Vec3d(-2, 2, 1), Vec3d(0.1, 0, 1).normalized(), 1.1, Vec3d(300, 500, 400)});
+  const Vec3d point(4, -6, 20);
+  for (Reflectance kind : {Reflectance::kLambertian, Reflectance::kFree, Reflectance::kUnlit}) {
+    Vec3d output(-0.5, -1, 0.2), normal = Vec3d(-0.2, 0.4, -1).normalized();
+    const Shading<double> shading = Shade(kind, output, normal, light, point);
+    for (int c = 0; c < 3; ++c) {
+      auto radiance = [&] { return Shade(kind, output, normal, light, point).radiance[c]; };
+      EXPECT_NEAR(shading.by_output[c], Difference(radiance, &output[c]), 1e-9);
+      for (int d = 0; d < 3; ++d) EXPECT_NEAR(shading.by_normal(c, d), Difference(radiance, &normal[d]), 1e-9);
+    }
+  }
+}
+
+// The whole loss of a batch of rays in a lumen with two lights, by every kind of parameter.
+class RayLossGradient : public testing::TestWithParam<Reflectance> {};
+
+TEST_P(RayLossGradient, MatchesFiniteDifferences) {
+  FieldOptions options;
+  options.reflectance = GetParam();
+  options.grid.levels = 3;
+  options.grid.log2_table_size = 9;
+  options.initial.radius_mm = 8;
+  options.initial.reach_mm = 10;
+  options.sdf_hidden = {9, 8};
+  options.color_hidden = {10};
+  options.features = 5;
+  Pose pose = Pose::Identity();
+  const InitialSurface initial(options.initial, {pose}, Vec3d::Zero());
+  const Field<double> field(options, initial, kBox);
+  std::vector<double> parameters(field.parameter_count());
+  field.Initialise(1, parameters.data());
+  uint64_t state = 31;
+  for (double& p : parameters) p += 0.05 * Random(state);
+
+  Light light;
+  light.sources.push_back({Vec3d(1, 0.5, 0), Vec3d::UnitZ(), 2.0, Vec3d(300, 200, 150)});
+  light.sources.push_back({Vec3d(-1, 0.2, 0), Vec3d::UnitZ(), 1.0, Vec3d(100, 200, 150)});
+  const std::vector<FrameLight<double>> lights = {LightOfFrame<double>(light, pose, Vec3d::Zero())};
+  std::vector<double> log_gain = {0.1};
+
+  RayBatch<double> batch;
+  batch.samples = 12;
+  for (int r = 0; r < 6; ++r) {
+    RayBatch<double>::Ray ray;
+    ray.origin = Vec3d(0.3, 0.1, -0.2);
+    ray.direction = Vec3d(Random(state), Random(state), 1.2).normalized();
+    ray.frame = 0;
+    ray.exposure = 1.3;
+    ray.floor = 1e-6;
+    ray.observed = Vec3d(0.5, 0.4, 0.3);
+    ray.bound = {PixelBound::kExact, PixelBound::kExact, PixelBound::kExact};
+    ray.eikonal_sample = 2;
+    batch.rays.push_back(ray);
+    for (int k = 0; k < 12; ++k) batch.distance.push_back(1 + 1.2 * k + 0.3 * Random(state));
+  }
+  LossSettings<double> settings{0.9, 1 / 2.2, 0.1, 0.3, Vec3d(-0.5, -1, -1.2), 0.1, 0.0, 1.0 / 6};
+
+  RayLoss<double> ray_loss(&field);
+  std::vector<double> unused(field.network_size());
+  double unused_gain;
+  auto loss = [&] {
+    const LossTerms terms = ray_loss.Evaluate(parameters.data(), batch, lights, log_gain, settings, unused.data(),
+                                              &(unused_gain = 0));
+    return terms.photometric + terms.eikonal + terms.albedo;
+  };
+  std::vector<double> gradient;
+  double gain_gradient = 0;
+  auto analytic = [&] {
+    gradient.assign(field.parameter_count(), 0.0);
+    const LossTerms terms = ray_loss.Evaluate(parameters.data(), batch, lights, log_gain, settings,
+                                              gradient.data() + field.grid_size(), &(gain_gradient = 0));
+    for (int l = 0; l < field.grid().levels(); ++l) ray_loss.GridBackward(l, gradient.data());
+    EXPECT_EQ(terms.active_samples, 72);
+    EXPECT_GT(terms.photometric, 0.01);
+  };
+  int compared = 0;
+  double largest = 0;
+  auto compare = [&](size_t i) {
+    const double expected = Difference(loss, &parameters[i], 1e-6);
+    EXPECT_NEAR(gradient[i], expected, 2e-6 * std::max(0.1, std::abs(expected))) << "parameter " << i;
+    largest = std::max(largest, std::abs(expected));
+    compared += expected != 0;
+  };
+  settings.albedo_weight = 0;
+  analytic();
+  for (size_t i = 0; i < field.grid_size(); i += 3) compare(i);
+  for (size_t i = field.grid_size(); i < parameters.size(); ++i) compare(i);
+  EXPECT_GT(compared, 200);
+  EXPECT_GT(largest, 1e-2);
+  if (GetParam() != Reflectance::kUnlit) {
+    EXPECT_NEAR(gain_gradient, Difference(loss, &log_gain[0]), 1e-7);
+  }
+  if (GetParam() != Reflectance::kLambertian) return;
+  // The pull on the albedo acts on the colour network (the last parameters: 10·(5 + 3) + 10 + 3·10 + 3) and not on
+  // the weights of the samples.
+  settings.albedo_weight = 0.3;
+  analytic();
+  for (size_t i = parameters.size() - 123; i < parameters.size(); ++i) compare(i);
+}
+
+INSTANTIATE_TEST_SUITE_P(Reflectances, RayLossGradient,
+                         testing::Values(Reflectance::kLambertian, Reflectance::kFree, Reflectance::kUnlit));
+
+}  // namespace
+}  // namespace lumen
