@@ -5,7 +5,6 @@
 
 #include "common/parallel.h"
 #include "common/random.h"
-#include "recon/adam.h"
 
 namespace lumen {
 namespace {

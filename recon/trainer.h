@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "recon/adam.h"
 #include "recon/march.h"
 #include "recon/options.h"
 #include "recon/ray_loss.h"
@@ -43,6 +44,7 @@ class Trainer {
   // World point that the field's coordinates count from.
   const Vec3d& origin() const { return origin_; }
   TrainState& state() { return state_; }
+  const TrainState& state() const { return state_; }
 
  private:
   // Rays that are computed together, by one thread.
