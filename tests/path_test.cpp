@@ -107,11 +107,11 @@ struct Stage {
 
 // DESIGN's formula in double: what a Lambertian place sends back, in camera axes. `envelope`: without the
 // cosine.
-Vec3d DirectRadiance(const Stage& stage, const Vec3d& place, const Vec3d& normal,
+Vec3d DirectRadiance(const Stage& stage, const Light& light, const Vec3d& place, const Vec3d& normal,
                      double* envelope = nullptr) {
   Vec3d sum = Vec3d::Zero();
   double largest = 0;
-  for (const LightSource& source : stage.light.sources) {
+  for (const LightSource& source : light.sources) {
     const Vec3d L = (place - source.position).normalized();
     const double fall =
         std::exp(-source.spread * (1 - source.direction.dot(L))) / (place - source.position).squaredNorm();
@@ -128,7 +128,8 @@ Vec3d PixelOf(const ImageF& image, int x, int y) {
 
 // Against the closed form at the place and with the normal of the very triangle: 1e-5 of the radiance, and
 // where the light grazes (cosine below 0.1) of what it would be at 0.1.
-void ExpectClosedForm(const Stage& stage) {
+// Returns how many pixels are off by more.
+int CompareWithClosedForm(const Stage& stage, const Light& expected_light) {
   const Film film = stage.Render();
   const FrameTruth truth =
       ComputeTruth(stage.wall, stage.exact_camera, stage.valid, stage.world_from_camera, nullptr);
@@ -142,15 +143,16 @@ void ExpectClosedForm(const Stage& stage) {
         continue;
       }
       double envelope;
-      const Vec3d expected = DirectRadiance(stage, camera_from_world * PixelOf(truth.position, x, y),
-                                            PixelOf(truth.normal, x, y), &envelope);
+      const Vec3d expected =
+          DirectRadiance(stage, expected_light, camera_from_world * PixelOf(truth.position, x, y),
+                         PixelOf(truth.normal, x, y), &envelope);
       lit += expected.maxCoeff() > 0;
       const double scale = std::max(expected.maxCoeff(), 0.1 * envelope);
       worse += (found - expected).cwiseAbs().maxCoeff() > 1e-5 * scale;
     }
   }
-  EXPECT_LE(worse, 2);  // rays on an edge, where camera rays in float and double may choose differently
   EXPECT_GT(lit, stage.intrinsics.width * stage.intrinsics.height / 3);
+  return worse;
 }
 
 TEST(Path, DirectLightOnSphereCylinderAndPlane) {
@@ -163,7 +165,11 @@ TEST(Path, DirectLightOnSphereCylinderAndPlane) {
         stage.light.sources.push_back({-guide, Vec3d::UnitZ(), 0.5, Vec3d(100, 200, 300)});
         stage.world_from_camera =
             Eigen::Translation3d(position) * Eigen::AngleAxisd(0.3, Vec3d(1, 2, 0.5).normalized());
-        ExpectClosedForm(stage);
+        // Two rays on an edge may choose differently in float and double.
+        EXPECT_LE(CompareWithClosedForm(stage, stage.light), 2);
+        Light moved = stage.light;
+        moved.sources[0].position.z() += 1e-3;  // mm
+        EXPECT_GT(CompareWithClosedForm(stage, moved), 100);
       }
     }
   }
@@ -178,7 +184,7 @@ double SmoothError(const Stage& stage, const std::function<Vec3d(const Vec3d&, c
       const Vec3d ray = stage.world_from_camera.linear() * *stage.exact_camera.Unproject(Vec2d(x, y));
       Vec3d normal;
       const Vec3d place = meet(stage.world_from_camera.translation(), ray, &normal);
-      const Vec3d expected = DirectRadiance(stage, stage.world_from_camera.inverse() * place,
+      const Vec3d expected = DirectRadiance(stage, stage.light, stage.world_from_camera.inverse() * place,
                                             stage.world_from_camera.linear().transpose() * normal);
       sum += (PixelOf(film.radiance, x, y) - expected).squaredNorm();
       scale += expected.squaredNorm();
@@ -202,14 +208,14 @@ TEST(Path, DirectLightConvergesToTheSmoothShape) {
     };
     double errors[3];
     for (int i = 0; i < 3; ++i) {
-      const int rings = 40 << (2 * i);
+      const int rings = 24 << (2 * i);
       Stage stage(axes == 3 ? Sphere(radius, rings) : Cylinder(radius, rings), Pinhole(32, 24, 16),
                   OneGuide({1, 2, 0}));
       stage.world_from_camera =
           Eigen::Translation3d(3, -2, 1) * Eigen::AngleAxisd(1.2, Vec3d(1, 0.3, 0).normalized());
       errors[i] = SmoothError(stage, meet);
     }
-    EXPECT_LT(errors[0], 0.1);
+    EXPECT_LT(errors[0], 0.2);
     EXPECT_LT(errors[1], errors[0] / 3);
     EXPECT_LT(errors[2], errors[1] / 3);
   }
@@ -233,7 +239,8 @@ TEST(Path, ShadowOfAnOffsetGuide) {
       const bool on_blocker = in_blocker(10 * ray);
       const Vec3d place = (on_blocker ? 10 : 30) * ray;
       const bool shadow = !on_blocker && in_blocker(guide + (place - guide) / 3);
-      const Vec3d expected = shadow ? Vec3d::Zero() : DirectRadiance(stage, place, -Vec3d::UnitZ());
+      const Vec3d expected =
+          shadow ? Vec3d::Zero() : DirectRadiance(stage, stage.light, place, -Vec3d::UnitZ());
       EXPECT_LE((PixelOf(film.radiance, x, y) - expected).norm(), 2e-5 * expected.norm()) << x << ' ' << y;
       dark += shadow;
     }
@@ -273,19 +280,19 @@ Estimate MeanIndirect(const Stage& stage, int seeds) {
 void ExpectIntegratingSphere(const Light& light, const Vec3d& position, double albedo, int bounces,
                              int roulette_after) {
   const double radius = 20;
-  Stage stage(Sphere(radius, 180), Pinhole(16, 12, 8), light);
+  Stage stage(Sphere(radius, 90), Pinhole(16, 12, 8), light);
   stage.surface.albedo = Vec3d::Constant(albedo);
   stage.world_from_camera =
       Eigen::Translation3d(position) * Eigen::AngleAxisd(0.4, Vec3d(1, 2, 0.5).normalized());
-  stage.options = {16, bounces, roulette_after};
+  stage.options = {8, bounces, roulette_after};
   Vec3d power = Vec3d::Zero();
   for (const LightSource& source : light.sources) power += Power(source);
   const double series = albedo * (1 - std::pow(albedo, bounces)) / (1 - albedo);
   const Vec3d expected = albedo / kPi * series / (4 * kPi * radius * radius) * power;
   const Estimate found = MeanIndirect(stage, 16);
   for (int c = 0; c < 3; ++c) {
-    // The inscribed polyhedron's area is smaller by less than (π/180)² = 0.03%, and so is the light's spread.
-    EXPECT_NEAR(found.mean[c], expected[c], 5 * found.standard_error[c] + 3e-4 * expected[c]);
+    // The inscribed polyhedron's area is smaller by less than (π/90)² = 0.12%, and so is the light's spread.
+    EXPECT_NEAR(found.mean[c], expected[c], 5 * found.standard_error[c] + 1.2e-3 * expected[c]);
     EXPECT_LT(found.standard_error[c], 0.01 * expected[c]);  // an interval that could not fail proves nothing
   }
 }

@@ -154,7 +154,6 @@ TEST(Sensor, RestingLoopHitsItsTarget) {
 }
 
 TEST(Sensor, DevelopsByHand) {
-  const Camera<double> camera = WidePinhole(4);
   const Image8 all(4, 1, 1, 255);
   const ImageF flat(4, 1, 1, 1.0f);
   const auto developed = [&](const Response& response, double gain, const std::vector<float>& values) {
@@ -173,14 +172,13 @@ TEST(Sensor, DevelopsByHand) {
 
 TEST(Sensor, KeepsChannelsApartAndInvalidPixelsBlack) {
   ImageF radiance(2, 1, 3, 0.5f);
-  radiance.Pixel(0, 0)[0] = 0.1f;
-  radiance.Pixel(0, 0)[1] = 0.2f;
-  radiance.Pixel(0, 0)[2] = 0.3f;
+  radiance.Pixel(0, 0)[0] = 0.2f;
+  radiance.Pixel(0, 0)[1] = 0.4f;
+  radiance.Pixel(0, 0)[2] = 0.6f;
   Image8 valid(2, 1, 1, 255);
   *valid.Pixel(1, 0) = 0;
   const Image8 image = Develop(Gamma(1), 1, radiance, ImageF(2, 1, 1, 1.0f), valid);
-  EXPECT_EQ(image.data,
-            (std::vector<uint8_t>{26, 51, 77, 0, 0, 0}));  // 25.5 (a hair above in float), 51, 76.5
+  EXPECT_EQ(image.data, (std::vector<uint8_t>{51, 102, 153, 0, 0, 0}));
 }
 
 TEST(Sensor, VignettesByThePowerOfTheCosine) {

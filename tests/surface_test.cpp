@@ -107,7 +107,7 @@ double ChiSquareOfLobe(const Vec3f& normal, bool uniform_sphere) {
     const Vec3f direction = uniform_sphere ? Vec3f(RandomPoint(8, i, 1).normalized())
                                            : lambert::Sample(normal, RandomPair(11, i));
     const float cosine = direction.dot(normal);
-    if (!uniform_sphere) EXPECT_NEAR(direction.norm(), 1, 1e-5);
+    EXPECT_NEAR(direction.norm(), 1, 1e-5);
     EXPECT_TRUE(uniform_sphere || cosine >= -1e-6f);
     const double turn = std::atan2(direction.dot(third), direction.dot(across)) / (2 * kPi) + 0.5;
     ++cells[std::clamp(int(cosine * cosine * 16), 0, 15) * 16 + std::clamp(int(turn * 16), 0, 15)];
