@@ -56,9 +56,15 @@ ColorBar ViewsBar(const Sequence& sequence) {
   return {Jet, "1", "frames that see it (grey: none)", std::to_string(sequence.frames.size())};
 }
 
-// The frame whose camera is furthest along the direction in which the cameras look on the whole: the deepest
-// in the colon. The last one where that is among the `taken`.
-int DeepestFrame(const Sequence& sequence, std::vector<int> taken) {
+struct NamedFrame {
+  std::string name;
+  int frame;
+};
+
+// First, middle and deepest frame of a sequence: the deepest is the one whose camera is furthest along the
+// direction in which the cameras look on the whole. A withdrawal starts there; then the last one stands for
+// it.
+std::vector<NamedFrame> KeyFrames(const Sequence& sequence) {
   Vec3d forward = Vec3d::Zero();
   for (const SequenceFrame& frame : sequence.frames) forward += frame.world_from_camera.linear().col(2);
   const auto depth = [&](const SequenceFrame& frame) {
@@ -67,9 +73,15 @@ int DeepestFrame(const Sequence& sequence, std::vector<int> taken) {
   const auto deepest =
       std::max_element(sequence.frames.begin(), sequence.frames.end(),
                        [&](const SequenceFrame& a, const SequenceFrame& b) { return depth(a) < depth(b); });
-  const int index = static_cast<int>(deepest - sequence.frames.begin());
-  const bool is_taken = std::find(taken.begin(), taken.end(), index) != taken.end();
-  return is_taken ? static_cast<int>(sequence.frames.size()) - 1 : index;
+  const int count = static_cast<int>(sequence.frames.size());
+  const int deepest_frame = static_cast<int>(deepest - sequence.frames.begin());
+  std::vector<NamedFrame> frames = {{"first", 0}, {"middle", count / 2}, {"deepest", deepest_frame}};
+  for (int other : {0, 1}) {
+    if (deepest_frame != frames[other].frame) continue;
+    frames[other].name += ", deepest";
+    frames[2] = {"last", count - 1};
+  }
+  return frames;
 }
 
 Image8 InputPanel(const Sequence& sequence, int frame, int width, int height) {
@@ -82,12 +94,12 @@ Image8 InputPanel(const Sequence& sequence, int frame, int width, int height) {
 
 Image8 Sheet(const Subjects& subjects, const View& outside, int height) {
   const Sequence& sequence = subjects.sequence;
-  const int count = static_cast<int>(sequence.frames.size());
   std::vector<Panel> panels;
-  for (int frame : {0, count / 2, DeepestFrame(sequence, {0, count / 2})}) {
+  for (const auto& [name, frame] : KeyFrames(sequence)) {
     const View view = WithinView(sequence, frame, height);
-    const std::string number = "frame " + std::to_string(sequence.frames[frame].number);
-    panels.push_back({number + ": input", InputPanel(sequence, frame, view.camera.width, height)});
+    const std::string number = std::to_string(sequence.frames[frame].number);
+    panels.push_back({"input: frame " + number + " (" + name + ")",
+                      InputPanel(sequence, frame, view.camera.width, height)});
     panels.push_back({"truth", subjects.truth.Draw(view, subjects.truth_plain)});
     panels.push_back({"reconstruction", subjects.reconstruction.Draw(view, subjects.reconstruction_plain)});
     panels.push_back({"error", subjects.reconstruction.Draw(view, subjects.reconstruction_error)});

@@ -6,9 +6,7 @@
 
 #include "common/parallel.h"
 #include "recon/layout.h"
-#include "recon/sheet.h"
 #include "tests/evaluation_scenes.h"
-#include "tests/support.h"
 
 namespace lumen {
 namespace {
@@ -133,21 +131,6 @@ TEST(Portrait, IsTheSameForAnyNumberOfThreads) {
   const Image8 many = portrait.Draw(view, colors);
   SetThreadCount(0);
   EXPECT_EQ(one.data, many.data);
-}
-
-TEST(Pictures, AreAllWritten) {
-  const Mesh truth = test::Tube(20, 120, 3, 40, 60), reconstruction = test::Tube(21, 118, 2, 50, 60);
-  const Sequence sequence = test::PinholeSequence({At(0, 0, 10), At(2, 1, 30), At(-2, 5, 50)});
-  const Evaluation evaluation = Evaluate(reconstruction, truth, sequence);
-  const test::ScratchFolder scratch;
-  WriteEvaluationPictures(evaluation, reconstruction, truth, sequence, scratch / "pictures");
-  for (const std::string name : {"error.png", "views.png", "sheet.png"}) {
-    EXPECT_GT(ReadImage8(scratch / "pictures" / name, 3).width, 600) << name;
-  }
-  const Mesh error = ReadMesh(scratch / "pictures" / "error.ply");
-  EXPECT_EQ(error.vertices.size(), reconstruction.vertices.size());
-  EXPECT_EQ(error.colors, ErrorColors(evaluation.signed_error_mm, 10));
-  EXPECT_EQ(ReadMesh(scratch / "pictures" / "views.ply").colors.size(), truth.vertices.size());
 }
 
 }  // namespace
