@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <queue>
-#include <utility>
 
 #include "common/error.h"
 
@@ -36,34 +34,6 @@ Vec3d CatmullRom(const Vec3d& p0, const Vec3d& p1, const Vec3d& p2, const Vec3d&
   };
   const Vec3d a = mix(p0, p1, t0, t1), b = mix(p1, p2, t1, t2), c = mix(p2, p3, t2, t3);
   return mix(mix(a, b, t0, t2), mix(b, c, t1, t3), t1, t2);
-}
-
-// Length of the shortest way along the mesh's edges from a vertex to each; infinity where there is none.
-std::vector<double> DistanceAlongEdges(const Mesh& mesh, int from) {
-  std::vector<std::vector<int>> neighbours(mesh.vertices.size());
-  for (const Vec3i& f : mesh.faces) {
-    for (int i = 0; i < 3; ++i) {
-      neighbours[f[i]].push_back(f[(i + 1) % 3]);
-      neighbours[f[(i + 1) % 3]].push_back(f[i]);
-    }
-  }
-  std::vector<double> distance(mesh.vertices.size(), std::numeric_limits<double>::infinity());
-  using Entry = std::pair<double, int>;
-  std::priority_queue<Entry, std::vector<Entry>, std::greater<>> queue;
-  distance[from] = 0;
-  queue.push({0, from});
-  while (!queue.empty()) {
-    const auto [length, v] = queue.top();
-    queue.pop();
-    if (length > distance[v]) continue;
-    for (const int n : neighbours[v]) {
-      const double next = length + (mesh.vertices[n] - mesh.vertices[v]).norm();
-      if (next >= distance[n]) continue;
-      distance[n] = next;
-      queue.push({next, n});
-    }
-  }
-  return distance;
 }
 
 }  // namespace
@@ -192,35 +162,14 @@ double NearestPass(const Centreline& centreline, double apart_mm) {
   return nearest;
 }
 
-std::vector<Vec3d> MiddleOfTube(const Mesh& mesh, double slice_mm) {
-  const auto farthest = [](const std::vector<double>& distance) {
-    int vertex = 0;
-    for (size_t v = 0; v < distance.size(); ++v) {
-      if (std::isfinite(distance[v]) && distance[v] > distance[vertex]) vertex = static_cast<int>(v);
-    }
-    return vertex;
+ArcFinder::ArcFinder(const Centreline& centreline)
+    : samples_(centreline.Points(1.0)), step_mm_(centreline.length_mm() / (samples_.size() - 1)) {}
+
+double ArcFinder::operator()(const Vec3d& place) const {
+  const auto nearer = [&](const Vec3d& a, const Vec3d& b) {
+    return (a - place).squaredNorm() < (b - place).squaredNorm();
   };
-  if (mesh.faces.empty()) return {};
-  const int end = farthest(DistanceAlongEdges(mesh, mesh.faces[0][0]));
-  const std::vector<double> distance = DistanceAlongEdges(mesh, end);
-  const size_t slices = static_cast<size_t>(distance[farthest(distance)] / slice_mm) + 1;
-  // Faces weigh by their area, so that the mesh's density doesn't count.
-  std::vector<Vec3d> sum(slices, Vec3d::Zero());
-  std::vector<double> area(slices, 0);
-  for (size_t f = 0; f < mesh.faces.size(); ++f) {
-    const Vec3i& face = mesh.faces[f];
-    const double from_end = (distance[face[0]] + distance[face[1]] + distance[face[2]]) / 3;
-    const size_t slice = std::min(static_cast<size_t>(from_end / slice_mm), slices - 1);
-    const double face_area = FaceArea(mesh, static_cast<int>(f));
-    area[slice] += face_area;
-    sum[slice] += face_area * (mesh.vertices[face[0]] + mesh.vertices[face[1]] + mesh.vertices[face[2]]) / 3;
-  }
-  std::vector<Vec3d> points;
-  for (size_t i = 0; i < slices; ++i) {
-    if (area[i] > 0) points.push_back(sum[i] / area[i]);
-  }
-  if (points.size() < 3) points.clear();
-  return points;
+  return step_mm_ * (std::min_element(samples_.begin(), samples_.end(), nearer) - samples_.begin());
 }
 
 }  // namespace lumen

@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "common/math.h"
-#include "common/mesh.h"
 
 namespace lumen {
 
@@ -50,9 +49,15 @@ std::vector<Vec3d> CurveThrough(const std::vector<Vec3d>& control_points);
 // other; infinity where it is too short for that. O(n²) over points 1 mm apart.
 double NearestPass(const Centreline& centreline, double apart_mm);
 
-// The middle of a tube, open or closed: along its edges from one end (the vertex farthest from any) to the
-// other, the centroids of slices of equal distance, `slice_mm` thick. Good to a fraction of the tube's
-// radius; empty where there are fewer than three slices.
-std::vector<Vec3d> MiddleOfTube(const Mesh& mesh, double slice_mm);
+// Arc length, to about 0.5 mm, of the point of a curve that is nearest to a place.
+class ArcFinder {
+ public:
+  explicit ArcFinder(const Centreline& centreline);
+  double operator()(const Vec3d& place) const;
+
+ private:
+  std::vector<Vec3d> samples_;
+  double step_mm_;
+};
 
 }  // namespace lumen

@@ -15,6 +15,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <utility>
 
 namespace lumen {
 namespace {
@@ -54,6 +56,13 @@ Mesh FromSurface(SurfaceMesh surface) {
   return mesh;
 }
 
+// What CGAL calls a polygon soup.
+void AsSoup(const Mesh& mesh, std::vector<Point>* points, std::vector<std::vector<size_t>>* polygons) {
+  for (const Vec3d& v : mesh.vertices) points->push_back(ToPoint(v));
+  for (const Vec3i& f : mesh.faces)
+    polygons->push_back({static_cast<size_t>(f[0]), static_cast<size_t>(f[1]), static_cast<size_t>(f[2])});
+}
+
 std::string Count(size_t count, const std::string& singular, const std::string& plural) {
   return std::to_string(count) + " " + (count == 1 ? singular : plural);
 }
@@ -65,23 +74,6 @@ void KeepLargest(SurfaceMesh* surface, RepairLog* log) {
     log->push_back("left out " + Count(dropped, "smaller piece", "smaller pieces") + " of " +
                    Count(before - num_faces(*surface), "face", "faces") + " in all");
 }
-
-// Arc length of the point of the curve that is nearest to a place; samples are 1 mm apart.
-class ArcFinder {
- public:
-  explicit ArcFinder(const Centreline& centreline)
-      : samples_(centreline.Points(1.0)), step_(centreline.length_mm() / (samples_.size() - 1)) {}
-  double operator()(const Vec3d& place) const {
-    const auto nearer = [&](const Vec3d& a, const Vec3d& b) {
-      return (a - place).squaredNorm() < (b - place).squaredNorm();
-    };
-    return step_ * (std::min_element(samples_.begin(), samples_.end(), nearer) - samples_.begin());
-  }
-
- private:
-  std::vector<Vec3d> samples_;
-  double step_;
-};
 
 // What lies behind a plane (normal·x < offset), faces that it crosses cut in two. Where two faces share an
 // edge, both get bitwise the same corner on it, so that welding joins them again.
@@ -109,12 +101,10 @@ Mesh BehindPlane(const Mesh& mesh, const Vec3d& normal, double offset) {
 
 }  // namespace
 
-Mesh MakeManifold(const Mesh& soup, RepairLog* log) {
+Mesh Weld(const Mesh& soup, RepairLog* log) {
   std::vector<Point> points;
   std::vector<std::vector<size_t>> polygons;
-  for (const Vec3d& v : soup.vertices) points.push_back(ToPoint(v));
-  for (const Vec3i& f : soup.faces)
-    polygons.push_back({static_cast<size_t>(f[0]), static_cast<size_t>(f[1]), static_cast<size_t>(f[2])});
+  AsSoup(soup, &points, &polygons);
   const size_t points_before = points.size(), faces_before = polygons.size();
   pmp::repair_polygon_soup(points, polygons);
   // A face whose corners lie exactly on one line has no normal.
@@ -125,6 +115,52 @@ Mesh MakeManifold(const Mesh& soup, RepairLog* log) {
   if (polygons.size() < faces_before)
     log->push_back("left out " + Count(faces_before - polygons.size(), "degenerate or doubled face",
                                        "degenerate or doubled faces"));
+  Mesh welded;
+  for (const Point& p : points) welded.vertices.push_back(ToVector(p));
+  for (const auto& f : polygons)
+    welded.faces.emplace_back(static_cast<int>(f[0]), static_cast<int>(f[1]), static_cast<int>(f[2]));
+  return welded;
+}
+
+bool OneSided(const Mesh& welded) {
+  std::map<std::pair<int, int>, std::vector<int>> faces_of;
+  for (size_t f = 0; f < welded.faces.size(); ++f) {
+    for (int i = 0; i < 3; ++i)
+      faces_of[std::minmax(welded.faces[f][i], welded.faces[f][(i + 1) % 3])].push_back(static_cast<int>(f));
+  }
+  const auto runs = [&](int face, int a, int b) {
+    const Vec3i& f = welded.faces[face];
+    return (f[0] == a && f[1] == b) || (f[1] == a && f[2] == b) || (f[2] == a && f[0] == b);
+  };
+  // Spreads an orientation, +1 or −1 of that which the file gives, from face to face.
+  std::vector<int> sign(welded.faces.size(), 0);
+  for (size_t seed = 0; seed < sign.size(); ++seed) {
+    if (sign[seed] != 0) continue;
+    sign[seed] = 1;
+    std::vector<int> open = {static_cast<int>(seed)};
+    while (!open.empty()) {
+      const int face = open.back();
+      open.pop_back();
+      for (int i = 0; i < 3; ++i) {
+        const int a = welded.faces[face][i], b = welded.faces[face][(i + 1) % 3];
+        const std::vector<int>& both = faces_of[std::minmax(a, b)];
+        if (both.size() != 2) continue;  // a border, or an edge of several sheets, which will be taken apart
+        const int other = both[0] == face ? both[1] : both[0];
+        const int expected = runs(other, b, a) ? sign[face] : -sign[face];
+        if (sign[other] == -expected) return true;
+        if (sign[other] == 0) open.push_back(other);
+        sign[other] = expected;
+      }
+    }
+  }
+  return false;
+}
+
+Mesh MakeManifold(const Mesh& soup, RepairLog* log) {
+  const Mesh welded_soup = Weld(soup, log);
+  std::vector<Point> points;
+  std::vector<std::vector<size_t>> polygons;
+  AsSoup(welded_soup, &points, &polygons);
   if (polygons.empty()) return {};
   const size_t welded = points.size();
   pmp::orient_polygon_soup(points, polygons);

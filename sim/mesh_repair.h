@@ -14,9 +14,16 @@ namespace lumen {
 // What was done to a mesh, a phrase each: "filled 2 holes".
 using RepairLog = std::vector<std::string>;
 
-// The largest piece of a triangle soup as an oriented manifold, perhaps with holes: equal vertices welded,
-// degenerate and doubled faces left out, faces turned to agree, vertices and edges that join more than one
-// sheet taken apart, stitched where borders coincide. Empty where nothing is left.
+// Triangles that share their corners: equal vertices are one, degenerate and doubled faces are left out.
+Mesh Weld(const Mesh& soup, RepairLog* log);
+
+// Whether a surface of welded triangles has one side only, as a Moebius strip: there is no way to turn its
+// faces so that they agree over every edge that joins two.
+bool OneSided(const Mesh& welded);
+
+// The largest piece of a triangle soup, welded, as an oriented manifold, perhaps with holes: faces turned to
+// agree, vertices and edges that join more than one sheet taken apart, stitched where borders coincide. Empty
+// where nothing is left.
 Mesh MakeManifold(const Mesh& soup, RepairLog* log);
 
 // Fills every hole of a manifold with a patch that continues the surface smoothly; turns the normals outward.

@@ -15,12 +15,13 @@
 #include "sim/centreline.h"
 #include "sim/clearance.h"
 #include "sim/mesh_repair.h"
+#include "sim/tube_middle.h"
 
 namespace lumen {
 namespace {
 
-// Slices whose centroids make a centreline where none is given: as wide as a colon's centreline is smooth.
-constexpr double kSlice_mm = 5;
+// Of the Gaussian that smooths a centreline: no steps in a camera's direction, no corner of the lumen cut.
+constexpr double kSigma_mm = 4;
 
 struct MeshOptions {
   std::filesystem::path path;
@@ -67,27 +68,6 @@ std::vector<Vec3d> ReadCentreline(const std::filesystem::path& file) {
   return points;
 }
 
-// Points 1 mm apart along the middle, each the mean of its surroundings by a Gaussian of 4 mm; the ends stay.
-Centreline SmoothCentreline(const std::vector<Vec3d>& points) {
-  constexpr double kSigma_mm = 4;
-  const std::vector<Vec3d> even = Centreline(points).Points(1.0);
-  const int count = static_cast<int>(even.size());
-  std::vector<Vec3d> smooth(even.size());
-  for (int i = 0; i < count; ++i) {
-    // A window that fits on both sides keeps the ends in place.
-    const int reach = std::min({i, count - 1 - i, static_cast<int>(3 * kSigma_mm)});
-    Vec3d sum = Vec3d::Zero();
-    double weights = 0;
-    for (int k = -reach; k <= reach; ++k) {
-      const double weight = std::exp(-0.5 * k * k / (kSigma_mm * kSigma_mm));
-      sum += weight * even[i + k];
-      weights += weight;
-    }
-    smooth[i] = sum / weights;
-  }
-  return Centreline(smooth);
-}
-
 [[noreturn]] void Refuse(const ConfigTable& table, const MeshOptions& options, const std::string& why) {
   table.Fail("path", "can't use " + options.path.string() + ": " + why);
 }
@@ -107,13 +87,13 @@ std::vector<Vec3d> InsidePart(const Mesh& mesh, const std::vector<Vec3d>& points
   return {points.begin() + best_begin, points.begin() + best_begin + best_length};
 }
 
-Centreline FindCentreline(const ConfigTable& table, const MeshOptions& options, const Mesh& closed) {
+Centreline FindCentreline(const ConfigTable& table, const MeshOptions& options, const Mesh& mesh) {
   std::vector<Vec3d> points =
-      table.Has("centreline") ? ReadCentreline(table.Path("centreline")) : MiddleOfTube(closed, kSlice_mm);
+      table.Has("centreline") ? ReadCentreline(table.Path("centreline")) : MiddleOfTube(mesh);
   if (points.size() < 2)
     Refuse(table, options, "no centreline could be found in it; name one with centreline");
   if (options.reverse) std::reverse(points.begin(), points.end());
-  return SmoothCentreline(points);
+  return Centreline(SmoothedCurve(points, kSigma_mm));
 }
 
 }  // namespace
@@ -124,6 +104,8 @@ Geometry LoadMeshSource(const ConfigTable& table) {
   for (Vec3d& v : mesh.vertices) v *= options.scale;
 
   RepairLog log;
+  RepairLog ignored;
+  if (OneSided(Weld(mesh, &ignored))) Refuse(table, options, "it has one side only, so it bounds no volume");
   mesh = MakeManifold(mesh, &log);
   if (mesh.faces.empty()) Refuse(table, options, "no face has an area");
   const Centreline middle = FindCentreline(table, options, mesh);
