@@ -68,11 +68,11 @@ std::string Count(size_t count, const std::string& singular, const std::string& 
 }
 
 void KeepLargest(SurfaceMesh* surface, RepairLog* log) {
-  const size_t before = num_faces(*surface);
+  const size_t before = surface->number_of_faces();
   const size_t dropped = pmp::keep_largest_connected_components(*surface, 1);
   if (dropped > 0 && log)
     log->push_back("left out " + Count(dropped, "smaller piece", "smaller pieces") + " of " +
-                   Count(before - num_faces(*surface), "face", "faces") + " in all");
+                   Count(before - surface->number_of_faces(), "face", "faces") + " in all");
 }
 
 // What lies behind a plane (normal·x < offset), faces that it crosses cut in two. Where two faces share an

@@ -154,6 +154,17 @@ TEST_F(MeshSource, RefusesWhatCantBeRepairedWithTheReason) {
             std::string::npos);
 }
 
+TEST(MeshRepair, KeepsTheLargestPieceAndSaysWhatItLeavesOut) {
+  Mesh soup = UntidyTube(40);
+  const size_t corners = soup.vertices.size();
+  soup.vertices.insert(soup.vertices.end(), {{90, 0, 0}, {95, 0, 0}, {90, 5, 0}});
+  soup.faces.emplace_back(corners, corners + 1, corners + 2);
+  RepairLog log;
+  const Mesh kept = MakeManifold(soup, &log);
+  EXPECT_LT(Bounds(kept).max().x(), 21);
+  EXPECT_EQ(log.back(), "left out 1 smaller piece of 1 face in all");
+}
+
 // A one-sided strip has no inside.
 TEST_F(MeshSource, RefusesAMoebiusStrip) {
   Mesh strip;
