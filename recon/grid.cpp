@@ -89,15 +89,18 @@ void Grid<T>::Encode(const T* tables, const Panel<T>& positions, Panel<T>* encod
       const Level& level = levels_[l];
       const T* table = tables + level.offset;
       Locate(level, positions.Tile(tile), &cell);
-      T* out0 = encoding->Row(tile, l * kFeatures);
-      T* out1 = encoding->Row(tile, l * kFeatures + 1);
-      std::fill(out0, out0 + 2 * kTile, T(0));
-      for (int c = 0; c < 8; ++c) {
+      for (int f = 0; f < kFeatures; ++f) {
+        T* out = encoding->Row(tile, l * kFeatures + f);
         for (int s = 0; s < kTile; ++s) {
           const T fx = cell.fraction[0][s], fy = cell.fraction[1][s], fz = cell.fraction[2][s];
-          const T weight = (c & 1 ? fx : 1 - fx) * (c & 2 ? fy : 1 - fy) * (c & 4 ? fz : 1 - fz);
-          out0[s] += weight * table[2 * cell.entry[c][s]];
-          out1[s] += weight * table[2 * cell.entry[c][s] + 1];
+          const T v0 = table[2 * cell.entry[0][s] + f], v1 = table[2 * cell.entry[1][s] + f];
+          const T v2 = table[2 * cell.entry[2][s] + f], v3 = table[2 * cell.entry[3][s] + f];
+          const T v4 = table[2 * cell.entry[4][s] + f], v5 = table[2 * cell.entry[5][s] + f];
+          const T v6 = table[2 * cell.entry[6][s] + f], v7 = table[2 * cell.entry[7][s] + f];
+          const T v01 = v0 + fx * (v1 - v0), v23 = v2 + fx * (v3 - v2);
+          const T v45 = v4 + fx * (v5 - v4), v67 = v6 + fx * (v7 - v6);
+          const T low = v01 + fy * (v23 - v01), high = v45 + fy * (v67 - v45);
+          out[s] = low + fz * (high - low);
         }
       }
     }

@@ -90,6 +90,7 @@ void ReadRest(const ConfigTable& root, TrainOptions* options) {
     s.learning_rate_final = schedule->Number("learning_rate_final", s.learning_rate_final, {1e-9, 1});
     s.sharpness_start_per_mm = schedule->Number("sharpness_start_per_mm", s.sharpness_start_per_mm, kPositive);
     s.sharpness_end_per_mm = schedule->Number("sharpness_end_per_mm", s.sharpness_end_per_mm, kPositive);
+    s.checkpoint_seconds = schedule->Number("checkpoint_seconds", s.checkpoint_seconds, kNotNegative);
   }
   if (const auto extract = root.Optional("extract")) {
     options->extract_cell_mm = extract->Number("cell_mm", options->extract_cell_mm, {1e-3, 1e3});
@@ -150,7 +151,8 @@ std::string FormatTrainOptions(const TrainOptions& o) {
       << "\nseconds = " << o.schedule.seconds << "\nlearning_rate = " << o.schedule.learning_rate
       << "\nlearning_rate_final = " << o.schedule.learning_rate_final
       << "\nsharpness_start_per_mm = " << o.schedule.sharpness_start_per_mm
-      << "\nsharpness_end_per_mm = " << o.schedule.sharpness_end_per_mm << "\n\n[extract]\ncell_mm = "
+      << "\nsharpness_end_per_mm = " << o.schedule.sharpness_end_per_mm
+      << "\ncheckpoint_seconds = " << o.schedule.checkpoint_seconds << "\n\n[extract]\ncell_mm = "
       << o.extract_cell_mm << "\n";
   return out.str();
 }

@@ -21,7 +21,7 @@ struct TrainOptions {
 
   struct Sampling {
     int rays = 256;         // a step
-    int coarse = 24;        // look-ups that find where a ray meets the surface
+    int coarse = 16;        // look-ups that find where a ray meets the surface
     int surface = 8;        // samples placed around that
     int spread = 9;         // samples spread in front of it
     double surface_spacing = 1;  // of those around it, in units of 1/s
@@ -42,6 +42,7 @@ struct TrainOptions {
     double learning_rate_final = 0.05;   // the part of it that is left at the end
     double sharpness_start_per_mm = 0.3;
     double sharpness_end_per_mm = 4.4;
+    double checkpoint_seconds = 10;  // between checkpoints
   } schedule;
 
   double extract_cell_mm = 0.75;

@@ -198,13 +198,16 @@ LossTerms RayLoss<T>::Evaluate(const T* parameters, const RayBatch<T>& batch,
 }
 
 template <class T>
-T RayLoss<T>::GradientSum() const {
-  T sum = 0;
+bool RayLoss<T>::GridGradientIsFinite() const {
+  // A sum is not finite if any of its terms isn't; a sum a lane, so that it takes no time.
+  T sum[kTile] = {};
   for (const Panel<T>* panel : {&surface_.input_delta, &surface_.scaled_direction, &surface_.sdf.input_gradient}) {
-    for (int tile = 0; tile < panel->tiles(); ++tile)
-      for (int i = 0; i < panel->rows() * kTile; ++i) sum += panel->Tile(tile)[i];
+    for (int row = 0; row < panel->tiles() * panel->rows(); ++row)
+      for (int s = 0; s < kTile; ++s) sum[s] += panel->Tile(0)[row * kTile + s];
   }
-  return sum;
+  T total = 0;
+  for (T lane : sum) total += lane;
+  return std::isfinite(total);
 }
 
 template class RayLoss<float>;

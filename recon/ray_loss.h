@@ -71,8 +71,8 @@ class RayLoss {
   void GridBackward(int level, T* grid_gradient) const {
     field_->GridBackward(level, surface_, static_cast<int>(active_.size()), grid_gradient);
   }
-  // Sum of everything that GridBackward spreads over the grid: not finite if any of it is.
-  T GradientSum() const;
+  // Whether everything that GridBackward spreads over the grid is finite.
+  bool GridGradientIsFinite() const;
 
  private:
   struct Active {

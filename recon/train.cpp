@@ -94,7 +94,7 @@ class Run {
         loss = loss_weight = 0;
       }
       result_.final_loss = step.loss.photometric + step.loss.eikonal + step.loss.albedo;
-      if (elapsed - last_checkpoint >= run_.checkpoint_seconds) {
+      if (elapsed - last_checkpoint >= options_.schedule.checkpoint_seconds) {
         last_checkpoint = elapsed;
         WriteCheckpoint(run_.folder / "checkpoint", settings_, state);
       }

@@ -13,8 +13,7 @@ namespace lumen {
 struct TrainRun {
   std::filesystem::path folder;
   uint64_t seed = 0;
-  bool resume = false;            // go on from the folder's checkpoint, if there is one
-  double checkpoint_seconds = 10; // between checkpoints
+  bool resume = false;  // go on from the folder's checkpoint, if there is one
 };
 
 struct TrainResult {

@@ -84,15 +84,13 @@ void Trainer::RunChunk(int index, const LossSettings<float>& settings) {
                       RandomBits(step_key, static_cast<uint64_t>(index), 1), &chunk.batch);
   chunk.terms = chunk.loss.Evaluate(state_.parameters.data(), chunk.batch, lights_, state_.log_gain, settings,
                                     chunk.network_gradient.data(), chunk.log_gain_gradient.data());
+  double sum = chunk.terms.photometric + chunk.terms.eikonal + chunk.terms.albedo;
+  for (float g : chunk.network_gradient) sum += g;
+  chunk.finite = std::isfinite(sum) && chunk.loss.GridGradientIsFinite();
 }
 
 bool Trainer::GradientsAreFinite() const {
-  for (const auto& chunk : chunks_) {
-    float sum = chunk->loss.GradientSum();
-    for (float g : chunk->network_gradient) sum += g;
-    if (!std::isfinite(chunk->terms.photometric + chunk->terms.eikonal + chunk->terms.albedo + sum)) return false;
-  }
-  return true;
+  return std::all_of(chunks_.begin(), chunks_.end(), [](const auto& chunk) { return chunk->finite; });
 }
 
 void Trainer::UpdateNetworks(const AdamStep& step) {

@@ -56,6 +56,7 @@ class Trainer {
     LineVector<float> network_gradient;
     std::vector<float> log_gain_gradient;
     LossTerms terms;
+    bool finite = true;  // loss and gradient
   };
   void RunChunk(int index, const LossSettings<float>& settings);
   LossSettings<float> SettingsAt(double progress) const;

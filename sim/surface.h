@@ -36,7 +36,8 @@ Surface ReadSurface(const ConfigTable& surface);
 // quintic interpolation).
 float GradientNoise(uint64_t seed, const Vec3f& point);
 
-// Albedo at a place, mm in the mesh's own axes; each channel within [0, 1] (what a texture would lift above is cut).
+// Albedo at a place, mm from the middle of the mesh's bounds (RayScene's local coordinates, so that a mesh far from
+// the world's origin keeps its texture); each channel within [0, 1] (what a texture would lift above is cut).
 Vec3f AlbedoAt(const Surface& surface, uint64_t seed, const Vec3f& place_mm);
 
 // Lambert's lobe as the triple eval / sample / pdf. Directions point away from the surface, cosines are to its

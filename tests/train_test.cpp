@@ -1,0 +1,151 @@
+// A whole run, small: the same bytes for any number of threads, and for a run that was killed and resumed.
+#include "recon/train.h"
+
+#include <gtest/gtest.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include "common/error.h"
+#include "common/files.h"
+#include "common/parallel.h"
+#include "common/progress.h"
+#include "recon/checkpoint.h"
+#include "sim/render.h"
+#include "tests/support.h"
+
+namespace lumen {
+namespace {
+
+using test::ScratchFolder;
+
+// Six small frames of the default scene, rendered once for all tests.
+const Sequence& SmallSequence() {
+  static const ScratchFolder folder;
+  static const Sequence sequence = [] {
+    SetQuiet(true);
+    const Scene scene = ReadScene(LUMEN_SOURCE_FOLDER "/scenes/colon.toml",
+                                  {"camera.width=90", "camera.height=72", "trajectory.frames=6", "path.samples=1",
+                                   "geometry.tolerance_mm=0.3", "truth.c3vd=false"},
+                                  0);
+    RenderOptions options;
+    options.folder = folder / "sequence";
+    Render(scene, options);
+    return ReadSequence(options.folder);
+  }();
+  return sequence;
+}
+
+std::vector<std::string> SmallSettings(int iterations) {
+  return {"schedule.iterations=" + std::to_string(iterations), "sampling.rays=96", "extract.cell_mm=3"};
+}
+
+TrainResult TrainSmall(const std::filesystem::path& folder, const std::vector<std::string>& settings) {
+  TrainRun run;
+  run.folder = folder;
+  return Train(SmallSequence(), ReadTrainOptions("fast", settings), run);
+}
+
+TEST(Train, SameBytesForAnyNumberOfThreads) {
+  const ScratchFolder folder;
+  SetThreadCount(1);
+  TrainSmall(folder / "one", SmallSettings(40));
+  SetThreadCount(2);
+  TrainSmall(folder / "two", SmallSettings(40));
+  SetThreadCount(0);
+  EXPECT_EQ(ReadFile(folder / "one/checkpoint"), ReadFile(folder / "two/checkpoint"));
+  EXPECT_EQ(ReadFile(folder / "one/mesh.ply"), ReadFile(folder / "two/mesh.ply"));
+  TrainSmall(folder / "longer", SmallSettings(41));
+  EXPECT_NE(ReadFile(folder / "one/mesh.ply"), ReadFile(folder / "longer/mesh.ply"));
+}
+
+// Starts the command; it writes a checkpoint after every step.
+pid_t StartTraining(const std::filesystem::path& folder, bool resume) {
+  const std::string sequence = SmallSequence().folder.string(), out = folder.string();
+  const pid_t child = fork();
+  if (child == 0) {
+    std::vector<const char*> arguments = {"lumen", "train", sequence.c_str(), "-o", out.c_str(), "--quiet",
+                                          "--iterations", "120", "--set", "sampling.rays=96", "--set",
+                                          "extract.cell_mm=3", "--set", "schedule.checkpoint_seconds=0"};
+    if (resume) arguments.push_back("--resume");
+    arguments.push_back(nullptr);
+    if (!freopen("/dev/null", "w", stdout)) _exit(3);
+    execv(LUMEN_COMMAND, const_cast<char* const*>(arguments.data()));
+    _exit(3);
+  }
+  return child;
+}
+
+int ExitCode(pid_t child) {
+  int status = 0;
+  waitpid(child, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+TEST(Train, KilledAndResumedEqualsUninterrupted) {
+  const ScratchFolder folder;
+  ASSERT_EQ(ExitCode(StartTraining(folder / "whole", false)), 0);
+  const pid_t child = StartTraining(folder / "killed", false);
+  while (!std::filesystem::exists(folder / "killed/checkpoint")) usleep(1000);
+  kill(child, SIGKILL);
+  EXPECT_EQ(ExitCode(child), -1);
+  ASSERT_FALSE(std::filesystem::exists(folder / "killed/mesh.ply"));
+  ASSERT_NE(ReadFile(folder / "whole/checkpoint"), ReadFile(folder / "killed/checkpoint"));
+  ASSERT_EQ(ExitCode(StartTraining(folder / "killed", true)), 0);
+  EXPECT_EQ(ReadFile(folder / "whole/checkpoint"), ReadFile(folder / "killed/checkpoint"));
+  EXPECT_EQ(ReadFile(folder / "whole/mesh.ply"), ReadFile(folder / "killed/mesh.ply"));
+}
+
+TEST(Train, NeusSeesNoLightAndStillEndsWithAMesh) {
+  const ScratchFolder folder;
+  TrainRun run;
+  run.folder = folder / "run";
+  const TrainResult result = Train(SmallSequence(), ReadTrainOptions("neus", SmallSettings(20)), run);
+  EXPECT_EQ(result.iterations, 20);
+  EXPECT_EQ(result.stopped_by, "iterations");
+  EXPECT_TRUE(std::filesystem::exists(folder / "run/mesh.ply"));
+}
+
+TEST(TrainOptions, AreReadBackFromTheirText) {
+  const TrainOptions options = ReadTrainOptions("fast", {"loss.eikonal=0.25", "network.sdf_hidden=[16, 8]"});
+  EXPECT_EQ(options.loss.eikonal, 0.25);
+  EXPECT_EQ(options.field.sdf_hidden, (std::vector<int>{16, 8}));
+  EXPECT_EQ(ReadTrainOptions("neus", {}).field.reflectance, Reflectance::kUnlit);
+  // Mistakes are named with the remedy.
+  const std::string misspelt = test::ErrorOf([] { ReadTrainOptions("fast", {"loss.eikonl=1"}); });
+  EXPECT_NE(misspelt.find("eikonal"), std::string::npos) << misspelt;
+  const std::string no_preset = test::ErrorOf([] { ReadTrainOptions("slow", {}); });
+  EXPECT_NE(no_preset.find("fast"), std::string::npos) << no_preset;
+}
+
+TEST(Checkpoint, DamageIsRefused) {
+  const ScratchFolder folder;
+  TrainState state;
+  state.parameters = {1, 2, 3};
+  state.first = {4, 5, 6};
+  state.second = {7, 8, 9};
+  state.iteration = 17;
+  WriteCheckpoint(folder / "checkpoint", "settings", state);
+  TrainState back;
+  back.parameters.resize(3);
+  back.first.resize(3);
+  back.second.resize(3);
+  ReadCheckpoint(folder / "checkpoint", "settings", &back);
+  EXPECT_EQ(back.iteration, 17);
+  EXPECT_EQ(back.second[2], 9);
+  const std::string bytes = ReadFile(folder / "checkpoint");
+  for (size_t at : {size_t(0), bytes.size() / 2, bytes.size() - 1}) {
+    std::string changed = bytes;
+    changed[at] ^= 1;
+    WriteFile(folder / "changed", changed);
+    EXPECT_THROW(ReadCheckpoint(folder / "changed", "settings", &back), InputError) << at;
+    WriteFile(folder / "cut", bytes.substr(0, at));
+    EXPECT_THROW(ReadCheckpoint(folder / "cut", "settings", &back), InputError) << at;
+  }
+  EXPECT_THROW(ReadCheckpoint(folder / "checkpoint", "others", &back), InputError);
+  back.first.resize(2);
+  EXPECT_THROW(ReadCheckpoint(folder / "checkpoint", "settings", &back), InputError);
+}
+
+}  // namespace
+}  // namespace lumen
