@@ -10,7 +10,7 @@
 namespace lumen {
 
 struct InitialSurfaceOptions {
-  double radius_mm = 25;
+  double radius_mm = 24;
   double reach_mm = 55;  // how far the tube goes on in each camera's viewing direction
 };
 

@@ -29,14 +29,14 @@ struct TrainOptions {
   } sampling;
 
   struct Loss {
-    double eikonal = 0.2;
+    double eikonal = 0.1;
     double albedo = 0.5;         // pull of the log albedo to its running mean, at the start
     double albedo_final = 0.02;  // the part of it that is left at the end
     double albedo_width = 0.3;   // of its Huber loss
   } loss;
 
   struct Schedule {
-    int64_t iterations = 8000;
+    int64_t iterations = 6000;
     double seconds = 0;  // > 0: the run is as long as that instead
     double learning_rate = 1e-2;
     double learning_rate_final = 0.05;   // the part of it that is left at the end

@@ -55,6 +55,49 @@ Trainer::Trainer(const TrainingFrames& frames, const TrainOptions& options, uint
   state_.log_gain.assign(frames.size(), 0.0f);
   state_.log_gain_first = state_.log_gain_second = state_.log_gain;
   field_->Initialise(seed, state_.parameters.data());
+  if (options.field.reflectance != Reflectance::kUnlit) MatchColorsToInitialSurface(initial);
+}
+
+// Starts the colours where they explain the pixels' median brightness on the initial surface. From anywhere else the
+// first steps would move the surface, which answers faster, to make up for the colours, and a wrong scale is a trap:
+// a dark wall that is near looks much like a bright one that is far.
+void Trainer::MatchColorsToInitialSurface(const InitialSurface& initial) {
+  constexpr int kRays = 1024;
+  constexpr float kSharp = 1e3f;  // 1/mm: all surface samples lie within a hundredth of a mm of the surface
+  RayBatch<float> batch;
+  batch.rays.resize(kRays);
+  const uint64_t key = RandomBits(seed_, 0x636f6c6f7273ull);
+  for (int r = 0; r < kRays; ++r) frames_.Draw(RandomBits(key, r), origin_, &batch.rays[r]);
+  Marcher(field_.get()).Place(state_.parameters.data(), options_.sampling, kSharp, key, &batch);
+  Panel<float> positions(3, TilesFor(kRays)), value(1, TilesFor(kRays)), normal(3, TilesFor(kRays));
+  for (int r = 0; r < kRays; ++r) {
+    const float t = batch.distance[size_t(r + 1) * batch.samples - 1];
+    for (int d = 0; d < 3; ++d) positions.At(d, r) = batch.rays[r].origin[d] + t * batch.rays[r].direction[d];
+  }
+  for (int tile = 0; tile < positions.tiles(); ++tile) {
+    initial.Evaluate<float>(positions.Tile(tile), value.Row(tile, 0), normal.Tile(tile));
+  }
+  std::vector<float> log_ratio[3];
+  for (int r = 0; r < kRays; ++r) {
+    const auto& ray = batch.rays[r];
+    const Vec3f n(normal.At(0, r), normal.At(1, r), normal.At(2, r));
+    const Vec3f point(positions.At(0, r), positions.At(1, r), positions.At(2, r));
+    const Shading<float> shading =
+        Shade<float>(options_.field.reflectance, Vec3f::Zero(), n, lights_[ray.frame], point);
+    for (int c = 0; c < 3; ++c) {
+      if (ray.bound[c] != PixelBound::kExact || !(shading.radiance[c] > 0)) continue;
+      const float linear = std::pow(ray.observed[c], 1 / static_cast<float>(frames_.inverse_gamma()));
+      log_ratio[c].push_back(std::log(linear / (ray.exposure * shading.radiance[c])));
+    }
+  }
+  // The biases of the colour network's outputs are its last parameters.
+  float* bias = &state_.parameters[state_.parameters.size() - 3];
+  for (int c = 0; c < 3; ++c) {
+    if (log_ratio[c].empty()) continue;
+    auto middle = log_ratio[c].begin() + static_cast<std::ptrdiff_t>(log_ratio[c].size() / 2);
+    std::nth_element(log_ratio[c].begin(), middle, log_ratio[c].end());
+    bias[c] = *middle;
+  }
 }
 
 LossSettings<float> Trainer::SettingsAt(double progress) const {

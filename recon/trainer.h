@@ -63,6 +63,7 @@ class Trainer {
   bool GradientsAreFinite() const;
   void UpdateNetworks(const AdamStep& step);
   void UpdateGains(const AdamStep& step);
+  void MatchColorsToInitialSurface(const InitialSurface& initial);
 
   const TrainingFrames& frames_;
   TrainOptions options_;
