@@ -199,7 +199,7 @@ TEST(CtColon, SceneGivesAClosedColonAndAClearPath) {
   EXPECT_TRUE(test::BoundsOneVolume(colon.mesh));
   EXPECT_GT(colon.centreline.size(), 100u);
   const std::vector<Pose> poses = BuildTrajectory(config.root().Table("trajectory"), colon, 1);
-  EXPECT_EQ(poses.size(), 60u);
+  EXPECT_EQ(poses.size(), 40u);
   for (size_t i = 0; i < poses.size(); i += 10)
     EXPECT_GE(test::DistanceByBruteForce(colon.mesh, poses[i].translation()), 5);
 }
