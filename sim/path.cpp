@@ -15,8 +15,19 @@ static_assert(kBlock * kBlock == RayPacket::kSize);
 
 constexpr float kFar = 1e30f;
 
-// Pairs of random numbers, by use.
-enum : uint32_t { kPixelPair = 0, kDirectionPair = 1, kRoulettePair = 2, kPairsPerBounce = 2 };
+// Pairs of random numbers, by use; from kDirectionPair on, one of each a bounce.
+enum : uint32_t {
+  kPixelPair = 0,
+  kDirectionPair = 1,
+  kRoulettePair = 2,
+  kGuidePair = 3,
+  kPairsPerBounce = 3
+};
+
+// bounce: from 1.
+constexpr uint32_t PairOf(int bounce, uint32_t use) {
+  return static_cast<uint32_t>(bounce - 1) * kPairsPerBounce + use;
+}
 
 struct Source {
   Vec3f position, direction;  // in the wall's coordinates
@@ -27,11 +38,11 @@ struct Source {
 
 struct Vertex {
   Vec3f point, normal;  // normal: unit, to the side that the ray came from; 0 for a face without area
-  Vec3f albedo;
+  Vec3f albedo;         // set for a packet at a time
 };
 
-// One frame's tracing. The effects that make a difference inside the loops are its template parameters, resolved once
-// a render: shadows of guides off the camera's place, light from wall to wall.
+// One frame's tracing. The effects that make a difference inside the loops are its template parameters,
+// resolved once a render: shadows of guides off the camera's place, light from wall to wall.
 template <bool kShadows, bool kBounces>
 class Tracer {
  public:
@@ -97,7 +108,8 @@ class Tracer {
       if (!lane.on || lane.samples == 0) continue;
       const double share = 1.0 / lane.samples;
       for (int c = 0; c < 3; ++c) {
-        film->radiance.Pixel(lane.x, lane.y)[c] = static_cast<float>(share * (lane.direct[c] + lane.indirect[c]));
+        film->radiance.Pixel(lane.x, lane.y)[c] =
+            static_cast<float>(share * (lane.direct[c] + lane.indirect[c]));
         if (!with_parts) continue;
         film->direct.Pixel(lane.x, lane.y)[c] = static_cast<float>(share * lane.direct[c]);
         film->indirect.Pixel(lane.x, lane.y)[c] = static_cast<float>(share * lane.indirect[c]);
@@ -105,9 +117,18 @@ class Tracer {
     }
   }
 
-  uint64_t PixelKey(const Lane& lane) const {
-    return (frame_ << 40) ^ (static_cast<uint64_t>(lane.y) * static_cast<uint64_t>(view_.valid->width) +
-                             static_cast<uint64_t>(lane.x));
+  // A block's paths, which take their bounces together: those still under way, where they are, and what share
+  // of the light that leaves there reaches the pixel.
+  struct Wavefront {
+    bool alive[RayPacket::kSize];
+    Vertex vertices[RayPacket::kSize];
+    Vec3f throughput[RayPacket::kSize];
+  };
+
+  Sampler SamplerOf(const Lane& lane, int sample) const {
+    const uint64_t width = static_cast<uint64_t>(view_.valid->width);
+    const uint64_t pixel = static_cast<uint64_t>(lane.y) * width + static_cast<uint64_t>(lane.x);
+    return Sampler(seed_, (frame_ << 40) ^ pixel, sample);
   }
 
   // One sample of each of a block's pixels.
@@ -116,7 +137,7 @@ class Tracer {
     for (int i = 0; i < RayPacket::kSize; ++i) {
       Vec2f pixel(static_cast<float>(lanes[i].x), static_cast<float>(lanes[i].y));
       if (lanes[i].on && options_.samples > 1) {
-        pixel += Sampler(seed_, PixelKey(lanes[i]), sample).Pair(kPixelPair) - Vec2f(0.5f, 0.5f);
+        pixel += SamplerOf(lanes[i], sample).Pair(kPixelPair) - Vec2f(0.5f, 0.5f);
       }
       const auto ray = lanes[i].on ? view_.camera->Unproject(pixel) : std::nullopt;
       const Vec3f direction = ray ? Vec3f(rotation_ * *ray) : Vec3f(0, 0, 1);
@@ -130,25 +151,23 @@ class Tracer {
     }
     HitPacket hits;
     scene_.wall->Intersect(rays, &hits);
-    Vertex vertices[RayPacket::kSize];
-    Vec3f direct[RayPacket::kSize];
+    Wavefront wave;
     for (int i = 0; i < RayPacket::kSize; ++i) {
-      direct[i] = Vec3f::Zero();
-      if (hits.face[i] == kNoFace) continue;
-      vertices[i] = VertexAt(hits.face[i], hits.u[i], hits.v[i],
-                             Vec3f(rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]));
+      wave.alive[i] = hits.face[i] != kNoFace;
+      if (!wave.alive[i]) continue;
+      wave.vertices[i] = VertexAt(hits.face[i], hits.u[i], hits.v[i],
+                                  Vec3f(rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]));
     }
-    for (const Source& source : sources_) AddDirect(source, hits, vertices, direct, count);
+    SetAlbedos(&wave);
+    Vec3f direct[RayPacket::kSize], indirect[RayPacket::kSize];
+    std::fill_n(direct, RayPacket::kSize, Vec3f(0, 0, 0));
+    std::fill_n(indirect, RayPacket::kSize, Vec3f(0, 0, 0));
+    for (const Source& source : sources_) AddDirect(source, wave, direct, count);
+    if constexpr (kBounces) FollowPaths(sample, lanes, &wave, indirect, count);
     for (int i = 0; i < RayPacket::kSize; ++i) {
       if (!lanes[i].on) continue;
       ++count->samples;
-      Vec3f indirect = Vec3f::Zero();
-      if constexpr (kBounces) {
-        if (hits.face[i] != kNoFace) {
-          indirect = FollowPath(vertices[i], Sampler(seed_, PixelKey(lanes[i]), sample), count);
-        }
-      }
-      Collect(direct[i], indirect, sample, &lanes[i], count);
+      Collect(direct[i], indirect[i], sample, &lanes[i], count);
     }
   }
 
@@ -176,8 +195,19 @@ class Tracer {
     const double length = cross.norm();
     vertex.normal = length > 0 ? (cross / length).template cast<float>() : Vec3f(Vec3f::Zero());
     if (vertex.normal.dot(incoming) > 0) vertex.normal = -vertex.normal;
-    vertex.albedo = AlbedoAt(*scene_.surface, scene_.surface_seed, vertex.point);
     return vertex;
+  }
+
+  void SetAlbedos(Wavefront* wave) const {
+    static_assert(Lanes3::kSize == RayPacket::kSize);
+    Lanes3 places, albedos;
+    for (int i = 0; i < RayPacket::kSize; ++i) {
+      for (int d = 0; d < 3; ++d) places.c[d][i] = wave->alive[i] ? wave->vertices[i].point[d] : 0.0f;
+    }
+    AlbedoAt(*scene_.surface, scene_.surface_seed, places, &albedos);
+    for (int i = 0; i < RayPacket::kSize; ++i) {
+      wave->vertices[i].albedo = Vec3f(albedos.c[0][i], albedos.c[1][i], albedos.c[2][i]);
+    }
   }
 
   // Light that comes from a source to a vertex and leaves it in any direction, shadows apart.
@@ -189,14 +219,13 @@ class Tracer {
     return (irradiance.per_intensity * cosine) * source.intensity.cwiseProduct(lambert::Eval(vertex.albedo));
   }
 
-  void AddDirect(const Source& source, const HitPacket& hits, const Vertex* vertices, Vec3f* direct,
-                 PathCount* count) const {
+  void AddDirect(const Source& source, const Wavefront& wave, Vec3f* direct, PathCount* count) const {
     Vec3f light[RayPacket::kSize];
     for (int i = 0; i < RayPacket::kSize; ++i) {
-      light[i] = hits.face[i] != kNoFace ? Reflected(source, vertices[i]) : Vec3f(Vec3f::Zero());
+      light[i] = wave.alive[i] ? Reflected(source, wave.vertices[i]) : Vec3f(Vec3f::Zero());
     }
     if constexpr (kShadows) {
-      if (!source.at_camera) Shade(source, vertices, light, count);
+      if (!source.at_camera) Shade(source, wave.vertices, light, count);
     }
     for (int i = 0; i < RayPacket::kSize; ++i) direct[i] += light[i];
   }
@@ -222,35 +251,69 @@ class Tracer {
       if (occluded[i]) light[i].setZero();
   }
 
-  // The path loop: from the first vertex on, what comes to it by way of other places.
-  Vec3f FollowPath(Vertex vertex, const Sampler& sampler, PathCount* count) const {
-    Vec3f radiance = Vec3f::Zero();
-    Vec3f throughput = Vec3f::Ones();
+  // The path loop: from the first vertices on, what comes to them by way of other places.
+  void FollowPaths(int sample, const Lane* lanes, Wavefront* wave, Vec3f* radiance, PathCount* count) const {
+    std::fill_n(wave->throughput, RayPacket::kSize, Vec3f(1, 1, 1));
     for (int bounce = 1; bounce <= options_.bounces; ++bounce) {
-      const uint32_t pairs = static_cast<uint32_t>(bounce - 1) * kPairsPerBounce;
-      // Cosine-distributed directions: BRDF · cos / density is the albedo.
-      throughput = throughput.cwiseProduct(vertex.albedo);
-      if (bounce > options_.roulette_after) {
-        const float survival = std::min(1.0f, std::sqrt(throughput.maxCoeff()));
-        if (sampler.Pair(pairs + kRoulettePair)[0] >= survival) break;
-        throughput /= survival;
+      bool any = false;
+      for (int i = 0; i < RayPacket::kSize; ++i) {
+        if (!wave->alive[i]) continue;
+        wave->alive[i] =
+            Bounce(SamplerOf(lanes[i], sample), bounce, &wave->vertices[i], &wave->throughput[i], count);
+        any = any || wave->alive[i];
       }
-      const Vec3f direction = lambert::Sample(vertex.normal, sampler.Pair(pairs + kDirectionPair));
-      const RayHit hit =
-          scene_.wall->Intersect(OffsetOrigin(vertex.point, vertex.normal), direction, 0.0f, kFar);
-      ++count->rays;
-      if (!hit.hit()) break;
-      vertex = VertexAt(hit.face, hit.u, hit.v, direction);
-      for (const Source& source : sources_) {
-        const Vec3f light = Reflected(source, vertex);
-        if (light.isZero(0)) continue;
-        const Vec3f from = OffsetOrigin(vertex.point, vertex.normal);
-        ++count->rays;
-        if (scene_.wall->Occluded(from, source.position - from, 0.0f, 1.0f)) continue;
-        radiance += throughput.cwiseProduct(light);
+      if (!any) break;
+      SetAlbedos(wave);
+      for (int i = 0; i < RayPacket::kSize; ++i) {
+        if (!wave->alive[i]) continue;
+        const float random = SamplerOf(lanes[i], sample).Pair(PairOf(bounce, kGuidePair))[0];
+        radiance[i] += wave->throughput[i].cwiseProduct(LightFromOneGuide(wave->vertices[i], random, count));
       }
     }
-    return radiance;
+  }
+
+  // Takes a path to its next vertex. False where it ends: by Russian roulette, or without meeting a wall.
+  bool Bounce(const Sampler& sampler, int bounce, Vertex* vertex, Vec3f* throughput, PathCount* count) const {
+    // Cosine-distributed directions: BRDF · cos / density is the albedo.
+    *throughput = throughput->cwiseProduct(vertex->albedo);
+    if (bounce > options_.roulette_after) {
+      const float survival = std::min(1.0f, std::sqrt(throughput->maxCoeff()));
+      if (sampler.Pair(PairOf(bounce, kRoulettePair))[0] >= survival) return false;
+      *throughput /= survival;
+    }
+    const Vec3f direction = lambert::Sample(vertex->normal, sampler.Pair(PairOf(bounce, kDirectionPair)));
+    const RayHit hit =
+        scene_.wall->Intersect(OffsetOrigin(vertex->point, vertex->normal), direction, 0.0f, kFar);
+    ++count->rays;
+    if (hit.hit()) *vertex = VertexAt(hit.face, hit.u, hit.v, direction);
+    return hit.hit();
+  }
+
+  // What a vertex sends on of the guides' light, estimated without bias from one of them, chosen by what each
+  // would send if nothing stood in its way: guides lie close together, so that one shadow ray tells nearly as
+  // much as one to each.
+  Vec3f LightFromOneGuide(const Vertex& vertex, float random, PathCount* count) const {
+    float sum = 0;
+    for (const Source& source : sources_) sum += Reflected(source, vertex).sum();
+    if (!std::isfinite(sum)) return Vec3f::Constant(sum);  // for Collect to name
+    if (!(sum > 0)) return Vec3f::Zero();
+    // Adds up in the order of `sum`, so that random < 1 finds a guide; where random · sum rounds up to sum,
+    // the last that shines.
+    const Source* chosen = nullptr;
+    Vec3f light = Vec3f::Zero();
+    float below = 0;
+    for (const Source& source : sources_) {
+      const Vec3f candidate = Reflected(source, vertex);
+      if (candidate.sum() == 0) continue;
+      chosen = &source;
+      light = candidate;
+      below += candidate.sum();
+      if (random * sum < below) break;
+    }
+    const Vec3f from = OffsetOrigin(vertex.point, vertex.normal);
+    ++count->rays;
+    if (scene_.wall->Occluded(from, chosen->position - from, 0.0f, 1.0f)) return Vec3f::Zero();
+    return light * (sum / light.sum());
   }
 
   const PathScene scene_;
@@ -263,8 +326,8 @@ class Tracer {
 };
 
 template <bool kShadows>
-PathCount RenderWith(const PathScene& scene, const View& view, const PathOptions& options, uint64_t seed, int frame,
-                     bool with_parts, Film* film) {
+PathCount RenderWith(const PathScene& scene, const View& view, const PathOptions& options, uint64_t seed,
+                     int frame, bool with_parts, Film* film) {
   if (options.bounces > 0) {
     return Tracer<kShadows, true>(scene, view, options, seed, frame).Run(with_parts, film);
   }
@@ -274,8 +337,8 @@ PathCount RenderWith(const PathScene& scene, const View& view, const PathOptions
 }  // namespace
 
 Vec3f OffsetOrigin(const Vec3f& point, const Vec3f& normal) {
-  // 256 steps of a coordinate's own floating point cover the rounding of the hit point and of the ray's transform;
-  // below 1/32 of a mm, where such steps vanish, a fixed length takes over.
+  // 256 steps of a coordinate's own floating point cover the rounding of the hit point and of the ray's
+  // transform; below 1/32 of a mm, where such steps vanish, a fixed length takes over.
   constexpr float kScale = 256, kNearZero = 1.0f / 32, kFixed = 1.0f / 65536;
   Vec3f moved;
   for (int d = 0; d < 3; ++d) {
@@ -286,8 +349,8 @@ Vec3f OffsetOrigin(const Vec3f& point, const Vec3f& normal) {
   return moved;
 }
 
-PathCount RenderFrame(const PathScene& scene, const View& view, const PathOptions& options, uint64_t seed, int frame,
-                      bool with_parts, Film* film) {
+PathCount RenderFrame(const PathScene& scene, const View& view, const PathOptions& options, uint64_t seed,
+                      int frame, bool with_parts, Film* film) {
   const bool shadows = std::any_of(view.light->sources.begin(), view.light->sources.end(),
                                    [](const LightSource& source) { return !source.position.isZero(0); });
   return shadows ? RenderWith<true>(scene, view, options, seed, frame, with_parts, film)

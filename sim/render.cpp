@@ -13,8 +13,8 @@
 namespace lumen {
 namespace {
 
-// The automatic gain meters every frame on a small picture of it, so that a frame's gain doesn't depend on which
-// frames are rendered. Its random numbers are its own.
+// The automatic gain meters every frame on a small picture of it, so that a frame's gain doesn't depend on
+// which frames are rendered. Its random numbers are its own.
 constexpr int kMeterReduction = 8;
 constexpr int kMeterSamples = 4;
 constexpr uint64_t kMeterSeed = 0x6d65746572ull;
@@ -45,6 +45,7 @@ class Renderer {
     const auto start = std::chrono::steady_clock::now();
     Progress progress("render");
     CreateFolder(options_.folder);
+    RemoveOldSequence();
     if (!scene_.truth.exact.empty()) CreateFolder(options_.folder / "exact");
     const std::vector<double> gains = Gains();
     const ImageF vignetting = VignettingMap(scene_.calibration.response, camera_);
@@ -61,7 +62,8 @@ class Renderer {
 
  private:
   bool Wants(const std::string& channel) const {
-    return std::find(scene_.truth.exact.begin(), scene_.truth.exact.end(), channel) != scene_.truth.exact.end();
+    return std::find(scene_.truth.exact.begin(), scene_.truth.exact.end(), channel) !=
+           scene_.truth.exact.end();
   }
 
   View ViewOf(int frame, const Camera<float>& camera, const Image8& valid) const {
@@ -69,11 +71,19 @@ class Renderer {
   }
 
   std::vector<double> Gains() const {
-    if (!scene_.sensor.auto_gain) return std::vector<double>(scene_.world_from_camera.size(), scene_.sensor.gain);
+    if (!scene_.sensor.auto_gain)
+      return std::vector<double>(scene_.world_from_camera.size(), scene_.sensor.gain);
     Calibration small = scene_.calibration;
     small.camera = Resized(small.camera, std::max(1, small.camera.width / kMeterReduction),
                            std::max(1, small.camera.height / kMeterReduction));
-    small.mask = {};
+    small.mask = Image8(small.camera.width, small.camera.height, 1);
+    for (int y = 0; y < small.mask.height; ++y) {
+      for (int x = 0; x < small.mask.width; ++x) {  // as the picture's pixel at its middle
+        *small.mask.Pixel(x, y) =
+            *valid_.Pixel(static_cast<int>((x + 0.5) * valid_.width / small.mask.width),
+                          static_cast<int>((y + 0.5) * valid_.height / small.mask.height));
+      }
+    }
     const Camera<double> camera(small.camera);
     const Camera<float> fast_camera(small.camera);
     const Image8 valid = ValidPixels(small);
@@ -82,8 +92,8 @@ class Renderer {
     std::vector<double> brightness;
     for (int frame = 0; frame < last_; ++frame) {
       Film film;
-      RenderFrame(path_scene_, ViewOf(frame, fast_camera, valid), path, RandomBits(options_.seed, kMeterSeed), frame,
-                  false, &film);
+      RenderFrame(path_scene_, ViewOf(frame, fast_camera, valid), path, RandomBits(options_.seed, kMeterSeed),
+                  frame, false, &film);
       brightness.push_back(MeterBrightness(scene_.calibration.response, film.radiance, valid, camera));
     }
     return RunAutoGain(*scene_.sensor.auto_gain, scene_.calibration.response, brightness);
@@ -91,8 +101,8 @@ class Renderer {
 
   void RenderOne(int frame, double gain, const ImageF& vignetting) {
     Film film;
-    const PathCount count = RenderFrame(path_scene_, ViewOf(frame, fast_camera_, valid_), scene_.path, options_.seed,
-                                        frame, Wants("direct") || Wants("indirect"), &film);
+    const PathCount count = RenderFrame(path_scene_, ViewOf(frame, fast_camera_, valid_), scene_.path,
+                                        options_.seed, frame, Wants("direct") || Wants("indirect"), &film);
     result_.samples += count.samples;
     result_.rays += count.rays;
     NoteFailure(frame, count.failure);
@@ -100,7 +110,8 @@ class Renderer {
     WriteImage(FrameFile(options_.folder, frame, "color.png"), color);
     if (scene_.truth.c3vd || !scene_.truth.exact.empty()) {
       const Pose* previous = frame > 0 ? &scene_.world_from_camera[frame - 1] : nullptr;
-      const FrameTruth truth = ComputeTruth(wall_, camera_, valid_, scene_.world_from_camera[frame], previous);
+      const FrameTruth truth =
+          ComputeTruth(wall_, camera_, valid_, scene_.world_from_camera[frame], previous);
       if (scene_.truth.c3vd) WriteC3vd(frame, truth);
       if (!scene_.truth.exact.empty()) WriteExact(frame, film, truth);
     }
@@ -108,10 +119,11 @@ class Renderer {
 
   void NoteFailure(int frame, const Failure& failure) {
     if (failure.count > 0 && result_.not_finite == 0) {
-      result_.first_not_finite = "frame " + std::to_string(frame) + ", pixel (" + std::to_string(failure.x) + ", " +
-                                 std::to_string(failure.y) + "), sample " + std::to_string(failure.sample) +
-                                 "; replay it with --frames " + std::to_string(frame) + ":" +
-                                 std::to_string(frame + 1) + " --seed " + std::to_string(options_.seed);
+      result_.first_not_finite = "frame " + std::to_string(frame) + ", pixel (" + std::to_string(failure.x) +
+                                 ", " + std::to_string(failure.y) + "), sample " +
+                                 std::to_string(failure.sample) + "; replay it with --frames " +
+                                 std::to_string(frame) + ":" + std::to_string(frame + 1) + " --seed " +
+                                 std::to_string(options_.seed);
     }
     result_.not_finite += failure.count;
   }
@@ -120,7 +132,8 @@ class Renderer {
     WriteImage(FrameFile(options_.folder, frame, "depth.tiff"), EncodeDepth(truth.z));
     WriteImage(FrameFile(options_.folder, frame, "normals.tiff"), EncodeNormals(truth.normal));
     WriteImage(FrameFile(options_.folder, frame, "occlusion.png"), truth.occlusion);
-    if (!truth.flow.empty()) WriteImage(FrameFile(options_.folder, frame, "flow.tiff"), EncodeFlow(truth.flow));
+    if (!truth.flow.empty())
+      WriteImage(FrameFile(options_.folder, frame, "flow.tiff"), EncodeFlow(truth.flow));
   }
 
   ImageF AlbedoMap(const FrameTruth& truth) const {
@@ -129,7 +142,8 @@ class Renderer {
       for (int x = 0; x < albedo.width; ++x) {
         const float* p = truth.position.Pixel(x, static_cast<int>(y));
         if (std::isnan(p[0])) continue;
-        const Vec3f value = AlbedoAt(scene_.surface, path_scene_.surface_seed, wall_.ToLocal(Vec3d(p[0], p[1], p[2])));
+        const Vec3f value =
+            AlbedoAt(scene_.surface, path_scene_.surface_seed, wall_.ToLocal(Vec3d(p[0], p[1], p[2])));
         std::copy(value.data(), value.data() + 3, albedo.Pixel(x, static_cast<int>(y)));
       }
     });
@@ -159,7 +173,8 @@ class Renderer {
     int channel = 0;
     for (const ImageF& image : images) {
       for (size_t pixel = 0; pixel < size_t(all.width) * all.height; ++pixel) {
-        std::copy_n(&image.data[pixel * image.channels], image.channels, &all.data[pixel * all.channels + channel]);
+        std::copy_n(&image.data[pixel * image.channels], image.channels,
+                    &all.data[pixel * all.channels + channel]);
       }
       channel += image.channels;
     }
@@ -173,7 +188,6 @@ class Renderer {
   }
 
   void WriteSequence(const std::vector<double>& gains) const {
-    RemoveStaleFrames();
     const Mesh& mesh = scene_.geometry.mesh;
     std::vector<uint8_t> seen(mesh.faces.size(), 0);
     Sequence sequence;
@@ -188,26 +202,35 @@ class Renderer {
       sequence.frames.push_back(entry);
       MarkObserved(wall_, camera_, valid_, entry.world_from_camera, &seen);
     }
-    WriteCoverageMesh(options_.folder / "coverage_mesh.obj", mesh, std::vector<bool>(seen.begin(), seen.end()));
+    WriteCoverageMesh(options_.folder / "coverage_mesh.obj", mesh,
+                      std::vector<bool>(seen.begin(), seen.end()));
     sequence.ground_truth_mesh = options_.folder / "mesh.ply";
     WriteMesh(sequence.ground_truth_mesh, mesh);
     WriteSequenceHeader(sequence);
   }
 
-  // An earlier sequence in the folder may have had more frames, or others: they would be taken for this one's.
-  void RemoveStaleFrames() const {
-    static const std::regex kFrameFile(R"((\d{4,})(_(color|occlusion)\.png|_(depth|normals|flow)\.tiff|\.exr))");
-    for (const auto& folder : {options_.folder, options_.folder / "exact"}) {
-      if (!std::filesystem::is_directory(folder)) continue;
-      std::vector<std::filesystem::path> stale;
-      for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-        std::smatch match;
-        const std::string name = entry.path().filename().string();
-        if (!std::regex_match(name, match, kFrameFile)) continue;
-        const int number = std::stoi(match[1]);
-        if (number < options_.first_frame || number >= last_) stale.push_back(entry.path());
+  // Whatever an earlier render left would be taken for this one's: frames that this one doesn't have, truth
+  // that it isn't asked for, a calibration estimated from other pictures. The header goes first and comes
+  // back last, so that a folder whose render was interrupted is no sequence.
+  void RemoveOldSequence() const {
+    const auto& folder = options_.folder;
+    if (std::filesystem::exists(folder / "pose.txt") && !std::filesystem::exists(folder / "sequence.toml")) {
+      throw InputError(folder.string() +
+                       ": holds a sequence that wasn't rendered (pose.txt without sequence.toml); " +
+                       "choose another folder");
+    }
+    for (const char* name : {"pose.txt", "sequence.toml", "calibration.toml", "mask.png"}) {
+      std::filesystem::remove(folder / name);
+    }
+    static const std::regex kFrameFile(
+        R"(\d{4,}(_(color|occlusion)\.png|_(depth|normals|flow)\.tiff|\.exr))");
+    for (const auto& place : {folder, folder / "exact"}) {
+      if (!std::filesystem::is_directory(place)) continue;
+      std::vector<std::filesystem::path> old;
+      for (const auto& entry : std::filesystem::directory_iterator(place)) {
+        if (std::regex_match(entry.path().filename().string(), kFrameFile)) old.push_back(entry.path());
       }
-      for (const auto& path : stale) std::filesystem::remove(path);
+      for (const auto& path : old) std::filesystem::remove(path);
     }
   }
 
@@ -224,6 +247,8 @@ class Renderer {
 
 }  // namespace
 
-RenderResult Render(const Scene& scene, const RenderOptions& options) { return Renderer(scene, options).Run(); }
+RenderResult Render(const Scene& scene, const RenderOptions& options) {
+  return Renderer(scene, options).Run();
+}
 
 }  // namespace lumen

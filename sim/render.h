@@ -22,14 +22,14 @@ struct RenderResult {
   int frames = 0;
   int64_t samples = 0;
   int64_t rays = 0;
-  int64_t not_finite = 0;       // samples left out
+  int64_t not_finite = 0;        // samples left out
   std::string first_not_finite;  // where the first was and how to replay it
   std::vector<std::string> effects;
 };
 
-// Writes the frames [first, last) of the scene, poses, gains and ground truth. Frames, gains included, don't depend on
-// which others are rendered. A folder that holds a sequence already gets its files replaced; frames of its own that
-// the new one doesn't have are removed. Throws InputError.
+// Writes the frames [first, last) of the scene, poses, gains and ground truth. Frames, gains included, don't
+// depend on which others are rendered. The files of an earlier render in the folder are removed first, its
+// calibration.toml included; a sequence that was not rendered is refused. Throws InputError.
 RenderResult Render(const Scene& scene, const RenderOptions& options);
 
 }  // namespace lumen

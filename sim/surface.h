@@ -1,4 +1,5 @@
-// What the mucosa does with light: a Lambertian wall whose albedo is a solid texture of place, with blood vessels.
+// What the mucosa does with light: a Lambertian wall whose albedo is a solid texture of place, with blood
+// vessels.
 #pragma once
 
 #include <cstdint>
@@ -32,16 +33,25 @@ struct Surface {
 // Reads the scene's [surface].
 Surface ReadSurface(const ConfigTable& surface);
 
-// Smooth noise in ±1 at a point, period-free, a function of seed (Perlin 2002: gradients at the integer lattice,
-// quintic interpolation).
+// Smooth noise in ±1 at a point, period-free, a function of seed (Perlin 2002: gradients at the integer
+// lattice, quintic interpolation).
 float GradientNoise(uint64_t seed, const Vec3f& point);
 
-// Albedo at a place, mm from the middle of the mesh's bounds (RayScene's local coordinates, so that a mesh far from
-// the world's origin keeps its texture); each channel within [0, 1] (what a texture would lift above is cut).
-Vec3f AlbedoAt(const Surface& surface, uint64_t seed, const Vec3f& place_mm);
+// Three numbers in each of a packet's lanes: places or albedos.
+struct alignas(64) Lanes3 {
+  static constexpr int kSize = 16;
+  float c[3][kSize];
+};
 
-// Lambert's lobe as the triple eval / sample / pdf. Directions point away from the surface, cosines are to its
-// normal. The BRDF is albedo/π.
+// Albedo at a place, mm from the middle of the mesh's bounds (RayScene's local coordinates, so that a mesh
+// far from the world's origin keeps its texture); each channel within [0, 1] (what a texture would lift above
+// is cut).
+Vec3f AlbedoAt(const Surface& surface, uint64_t seed, const Vec3f& place_mm);
+// The same in sixteen places at once, lane for lane the same bits.
+void AlbedoAt(const Surface& surface, uint64_t seed, const Lanes3& place_mm, Lanes3* albedo);
+
+// Lambert's lobe as the triple eval / sample / pdf. Directions point away from the surface, cosines are to
+// its normal. The BRDF is albedo/π.
 namespace lambert {
 inline Vec3f Eval(const Vec3f& albedo) { return albedo * static_cast<float>(1 / kPi); }
 inline float Pdf(float cosine) { return cosine > 0 ? cosine * static_cast<float>(1 / kPi) : 0.0f; }

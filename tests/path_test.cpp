@@ -309,6 +309,32 @@ TEST(Path, IntegratingSphere) {
   ExpectIntegratingSphere(guides, {4, -6, 3}, 0.9, 40, 3);
 }
 
+// Light adds up: what several guides send by way of the wall is the sum of what each of them sends, though a
+// path asks only one of them at each of its vertices. A plate keeps one guide from much of the sphere.
+TEST(Path, OneGuideAVertexStandsForAll) {
+  Mesh mesh = Sphere(20, 30);
+  AddPlate(&mesh, 2, 9, -6, 6, 4);
+  Light guides = OneGuide({3.2, 0.5, 0}, 2.77, 300);
+  guides.sources.push_back({{-2.8, 2.7, 0}, Vec3d(-0.2, 0.1, 1).normalized(), 1.5, {100, 200, 300}});
+  guides.sources.push_back({{-1.3, -3.1, 0}, Vec3d::UnitZ(), 0, {30, 20, 10}});
+  Stage stage(mesh, Pinhole(16, 12, 8), guides);
+  stage.options = {8, 2, 9};
+  const Estimate together = MeanIndirect(stage, 16);
+  Vec3d sum = Vec3d::Zero(), variance = together.standard_error.cwiseAbs2(), smallest = together.mean;
+  for (const LightSource& source : guides.sources) {
+    stage.light.sources = {source};
+    const Estimate alone = MeanIndirect(stage, 16);
+    sum += alone.mean;
+    smallest = smallest.cwiseMin(alone.mean);
+    variance += alone.standard_error.cwiseAbs2();
+  }
+  for (int c = 0; c < 3; ++c) {
+    const double interval = 5 * std::sqrt(variance[c]);
+    EXPECT_NEAR(together.mean[c], sum[c], interval);
+    EXPECT_LT(interval, smallest[c]);  // leaving one out would be noticed
+  }
+}
+
 TEST(Path, PartsAddUp) {
   Stage stage(Sphere(20, 30), Pinhole(24, 18, 12), OneGuide({3, 1, 0}));
   stage.world_from_camera.translation() = Vec3d(4, -6, 3);

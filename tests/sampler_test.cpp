@@ -37,6 +37,25 @@ bool IsNet(const Points& points, int m) {
   return true;
 }
 
+// The direction numbers of x + 1 are each the one before xor its shift by one.
+uint32_t SobolSecondByDirections(uint32_t index) {
+  uint32_t result = 0;
+  for (uint32_t direction = 1u << 31; index; index >>= 1, direction ^= direction >> 1) {
+    if (index & 1) result ^= direction;
+  }
+  return result;
+}
+
+TEST(Sampler, SecondDimensionIsSobols) {
+  for (uint32_t i = 0; i < 100000; ++i) {
+    const uint32_t index = i < 4096 ? i : static_cast<uint32_t>(RandomBits(3, i));
+    ASSERT_EQ(ReverseBits(SobolSecondReversed(index)), SobolSecondByDirections(index)) << index;
+  }
+  // 0, 1/2, 3/4, 1/4, 5/8: by hand.
+  const uint32_t first[] = {0u, 1u << 31, 3u << 30, 1u << 30, 5u << 29};
+  for (uint32_t i = 0; i < 5; ++i) EXPECT_EQ(ReverseBits(SobolSecondReversed(i)), first[i]) << i;
+}
+
 TEST(Sampler, EverySixteenSamplesAreANet) {
   for (uint64_t pixel = 0; pixel < 200; ++pixel) {
     for (const uint32_t pair : {0u, 1u, 7u}) {

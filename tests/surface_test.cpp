@@ -98,6 +98,27 @@ TEST(Surface, VesselsAbsorb) {
   EXPECT_LT(vessel, count / 3);
 }
 
+TEST(Surface, SixteenPlacesAtOnceAreTheSameBits) {
+  Surface surface;
+  surface.mottling.emplace();
+  surface.vessels = Vessels{9, 2, Vec3d(0.15, 0.7, 0.5)};
+  int in_vessels = 0;
+  for (int packet = 0; packet < 1000; ++packet) {
+    Lanes3 places, albedos;
+    for (int i = 0; i < Lanes3::kSize; ++i) {
+      const Vec3f place = RandomPoint(14, packet * Lanes3::kSize + i, 60);
+      for (int c = 0; c < 3; ++c) places.c[c][i] = place[c];
+    }
+    AlbedoAt(surface, 7, places, &albedos);
+    for (int i = 0; i < Lanes3::kSize; ++i) {
+      const Vec3f one = AlbedoAt(surface, 7, {places.c[0][i], places.c[1][i], places.c[2][i]});
+      for (int c = 0; c < 3; ++c) ASSERT_EQ(albedos.c[c][i], one[c]) << packet << ' ' << i;
+      in_vessels += one.z() < 0.85f * one.x() * 0.3f / 0.8f;
+    }
+  }
+  EXPECT_GT(in_vessels, 100);
+}
+
 // cos²θ and φ of the cosine's density are both uniform: χ² of 16 × 16 cells, 255 degrees of freedom.
 double ChiSquareOfLobe(const Vec3f& normal, bool uniform_sphere) {
   const Vec3f across = normal.unitOrthogonal(), third = normal.cross(across);
