@@ -8,7 +8,7 @@
 namespace lumen {
 namespace {
 
-constexpr char kMagic[8] = {'l', 'u', 'm', 'e', 'n', 'c', 'k', '1'};
+constexpr char kMagic[8] = {'l', 'u', 'm', 'e', 'n', 'c', 'k', '2'};
 
 // FNV-1a, 64 bits (Fowler, Noll, Vo).
 uint64_t Checksum(std::string_view bytes) {
@@ -73,9 +73,6 @@ void Fields(Archive&& value, State& state) {
   value(state.seconds);
   value(state.skipped_steps);
   value(state.first_skipped_step);
-  value(state.albedo_log_mean[0]);
-  value(state.albedo_log_mean[1]);
-  value(state.albedo_log_mean[2]);
 }
 template <class Archive, class State>
 void Arrays(Archive&& array, State& state) {

@@ -8,7 +8,7 @@
 namespace lumen {
 namespace {
 
-constexpr int kSecantSteps = 2;
+constexpr int kSecantSteps = 3;
 
 // The steepness, as |df/dt|, that spacing counts with: at grazing incidence the density's layer is longer along the
 // ray than its width, but by no more than five times is it followed.

@@ -30,7 +30,7 @@ struct TrainOptions {
 
   struct Loss {
     double eikonal = 0.1;
-    double albedo = 0.5;         // pull of the log albedo to its running mean, at the start
+    double albedo = 2;           // pull of the log albedo to its mean over neighbouring rays, at the start
     double albedo_final = 0.02;  // the part of it that is left at the end
     double albedo_width = 0.3;   // of its Huber loss
   } loss;
@@ -40,7 +40,7 @@ struct TrainOptions {
     double seconds = 0;  // > 0: the run is as long as that instead
     double learning_rate = 1e-2;
     double learning_rate_final = 0.05;   // the part of it that is left at the end
-    double sharpness_start_per_mm = 0.3;
+    double sharpness_start_per_mm = 0.6;
     double sharpness_end_per_mm = 4.4;
     double checkpoint_seconds = 10;  // between checkpoints
   } schedule;

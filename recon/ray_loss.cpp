@@ -16,8 +16,6 @@ LossTerms& LossTerms::operator+=(const LossTerms& other) {
   photometric += other.photometric;
   eikonal += other.eikonal;
   albedo += other.albedo;
-  albedo_log_sum += other.albedo_log_sum;
-  albedo_weight_sum += other.albedo_weight_sum;
   active_samples += other.active_samples;
   return *this;
 }
@@ -134,27 +132,16 @@ void RayLoss<T>::BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& 
   surface_.color_delta.SetZero();
   weight_delta_.assign(weight_.size(), T(0));
   distance_delta_.resize(weight_.size());
-  const bool pulls_albedo = settings.albedo_weight > 0;
   for (size_t i = 0; i < active_.size(); ++i) {
     const Active& sample = active_[i];
     if (!(sample.weight > 0)) continue;
     const Vec3<T>& delta = radiance_delta_[sample.ray];
     weight_delta_[size_t(sample.ray) * n + sample.sample] = delta.dot(shading_[i].radiance);
     for (int c = 0; c < 3; ++c) {
-      T out = delta[c] * sample.weight * shading_[i].by_output[c];
-      // The pull acts on the albedo alone: a weight that depended on it would move the surface to where it is mean.
-      if (pulls_albedo) {
-        const T log_albedo = surface_.color_output().At(c, i);
-        const T share = settings.albedo_weight * settings.per_ray * sample.weight / 3;
-        const Term<T> pull = HuberLoss(log_albedo - settings.albedo_log_mean[c], settings.albedo_width);
-        terms->albedo += share * pull.value;
-        out += share * pull.slope;
-        terms->albedo_log_sum[c] += sample.weight * log_albedo;
-      }
-      surface_.color_delta.At(c, i) = out;
+      surface_.color_delta.At(c, i) = delta[c] * sample.weight * shading_[i].by_output[c];
     }
-    if (pulls_albedo) terms->albedo_weight_sum += sample.weight;
   }
+  if (settings.albedo_weight > 0) terms->albedo = PullAlbedo(settings);
   for (size_t r = 0; r < batch.rays.size(); ++r) {
     RayWeightsBackward(n, &signed_distance_[r * n], settings.sharpness, &transmittance_[r * n], &weight_delta_[r * n],
                        &distance_delta_[r * n]);
@@ -162,6 +149,35 @@ void RayLoss<T>::BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& 
   for (size_t i = 0; i < active_.size(); ++i) {
     surface_.value_delta.At(0, i) = distance_delta_[size_t(active_[i].ray) * n + active_[i].sample];
   }
+}
+
+// Pulls the samples' log albedo towards its mean over the batch. The mean is the batch's own and moves with it, so the
+// pull is on the spread alone and never on the level: a pull to a fixed mean would hold the whole reconstruction at the
+// scale at which it starts. It acts on the albedo alone: a weight that depended on it would move the surface to where
+// the albedo is mean.
+template <class T>
+double RayLoss<T>::PullAlbedo(const LossSettings<T>& settings) {
+  double loss = 0;
+  const T share = settings.albedo_weight * settings.per_ray / 3;
+  pull_.resize(active_.size());
+  for (int c = 0; c < 3; ++c) {
+    T weight = 0, mean = 0, mean_slope = 0;
+    for (size_t i = 0; i < active_.size(); ++i) {
+      weight += active_[i].weight;
+      mean += active_[i].weight * surface_.color_output().At(c, i);
+    }
+    if (!(weight > 0)) return 0;
+    mean /= weight;
+    for (size_t i = 0; i < active_.size(); ++i) {
+      pull_[i] = HuberLoss(surface_.color_output().At(c, i) - mean, settings.albedo_width);
+      loss += share * active_[i].weight * pull_[i].value;
+      mean_slope += active_[i].weight * pull_[i].slope / weight;
+    }
+    for (size_t i = 0; i < active_.size(); ++i) {
+      surface_.color_delta.At(c, i) += share * active_[i].weight * (pull_[i].slope - mean_slope);
+    }
+  }
+  return loss;
 }
 
 template <class T>

@@ -36,8 +36,7 @@ struct LossSettings {
   T sharpness;       // s, 1/mm
   T inverse_gamma;   // of the comparison
   T eikonal_weight;
-  T albedo_weight;   // of the pull of the albedo to its mean; kLambertian only
-  Vec3<T> albedo_log_mean;
+  T albedo_weight;   // of the pull of the albedo to the batch's mean; kLambertian only
   T albedo_width;    // of its Huber loss, in log
   // Samples whose weight and whose influence on any weight are below this are left out.
   T weight_threshold;
@@ -49,9 +48,6 @@ struct LossTerms {
   double photometric = 0;
   double eikonal = 0;
   double albedo = 0;
-  // Σ weight · log albedo and Σ weight, for the running mean.
-  Vec3d albedo_log_sum = Vec3d::Zero();
-  double albedo_weight_sum = 0;
   int64_t active_samples = 0;
 
   LossTerms& operator+=(const LossTerms& other);
@@ -85,6 +81,7 @@ class RayLoss {
   void ShadeActive(const T* parameters, const RayBatch<T>& batch, const std::vector<FrameLight<T>>& lights);
   double ComparePixels(const RayBatch<T>& batch, const std::vector<T>& log_gain, const LossSettings<T>& settings,
                        T* log_gain_gradient);
+  double PullAlbedo(const LossSettings<T>& settings);
   void BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& settings, LossTerms* terms);
 
   const Field<T>* field_;
@@ -94,6 +91,7 @@ class RayLoss {
   std::vector<Vec3<T>> radiance_delta_;                                                      // a ray
   std::vector<Active> active_;
   std::vector<Shading<T>> shading_;  // an active sample
+  std::vector<Term<T>> pull_;        // on its albedo, of one channel
 };
 
 }  // namespace lumen

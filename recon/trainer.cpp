@@ -10,7 +10,6 @@ namespace lumen {
 namespace {
 
 constexpr int kChunkRays = 32;
-constexpr double kAlbedoMeanMemory = 0.95;  // of the running mean, a step
 
 double LogInterpolate(double from, double to, double at) { return from * std::pow(to / from, at); }
 
@@ -110,7 +109,6 @@ LossSettings<float> Trainer::SettingsAt(double progress) const {
   const bool lambertian = options_.field.reflectance == Reflectance::kLambertian;
   settings.albedo_weight =
       lambertian ? static_cast<float>(options_.loss.albedo * std::pow(options_.loss.albedo_final, progress)) : 0.0f;
-  settings.albedo_log_mean = state_.albedo_log_mean.cast<float>();
   settings.albedo_width = static_cast<float>(options_.loss.albedo_width);
   settings.weight_threshold = static_cast<float>(options_.sampling.weight_threshold);
   settings.per_ray = 1.0f / static_cast<float>(options_.sampling.rays);
@@ -189,11 +187,6 @@ StepReport Trainer::Step(double progress) {
                &state_.first[begin], &state_.second[begin]);
   });
   UpdateGains(step);
-  if (report.loss.albedo_weight_sum > 0) {
-    const Vec3d mean = report.loss.albedo_log_sum / report.loss.albedo_weight_sum;
-    const double keep = state_.iteration == 1 ? 0.0 : kAlbedoMeanMemory;
-    state_.albedo_log_mean = keep * state_.albedo_log_mean + (1 - keep) * mean;
-  }
   return report;
 }
 

@@ -21,7 +21,6 @@ struct TrainState {
   double seconds = 0;  // spent so far; only runs that end by the clock count them
   LineVector<float> parameters, first, second;  // Adam's moments
   std::vector<float> log_gain, log_gain_first, log_gain_second;  // a frame; 0 where the gain is known
-  Vec3d albedo_log_mean = Vec3d::Zero();
   int64_t skipped_steps = 0;        // whose loss or gradient was not finite
   int64_t first_skipped_step = -1;
 };

@@ -16,6 +16,7 @@ void RayWeights(int n, const T* signed_distance, T sharpness, T* transmittance, 
     weight[i + 1] = section / 2;
     log_here = log_next;
   }
+  weight[n - 1] += transmittance[n - 1];
 }
 
 template <class T>
@@ -23,7 +24,7 @@ void RayWeightsBackward(int n, const T* signed_distance, T sharpness, const T* t
                         T* distance_delta) {
   // With w_i a section's weight and ℓ_i its logarithm: ∂w_i/∂ℓ_i = −transmittance behind it, ∂w_i/∂ℓ_j = w_i for the
   // sections j before it. dlogΦ(y)/dy = Φ(−y).
-  T behind = 0;  // Σ over the sections behind of weight · delta
+  T behind = transmittance[n - 1] * weight_delta[n - 1];  // Σ over the sections behind of weight · delta
   T from_next = 0;  // ∂loss/∂ℓ of the section after sample i
   for (int i = n - 1; i >= 0; --i) {
     T from_previous = 0;

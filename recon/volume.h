@@ -21,7 +21,9 @@ T Sigmoid(T x) {
 }
 
 // Weights of the n samples of a ray: a section's opacity times the transmittance before it, half to each of its ends
-// (the trapezoidal rule). transmittance: n numbers, from 1 at the first sample to what passes the last.
+// (the trapezoidal rule). What passes the last sample is the last one's: the wall is opaque, and a ray whose weights
+// fell short of 1 would be dark in a way that only a nearer wall can mend, a force on every surface and always the same
+// way. transmittance: n numbers, from 1 at the first sample to what passes the last.
 template <class T>
 void RayWeights(int n, const T* signed_distance, T sharpness, T* transmittance, T* weight);
 
