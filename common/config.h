@@ -1,5 +1,5 @@
-// Configuration in TOML, read so that every mistake is an error with file and line: an unknown key, a missing one, a
-// value of the wrong type or out of range.
+// Configuration in TOML, read so that every mistake is an error with file and line: an unknown key, a missing
+// one, a value of the wrong type or out of range.
 #pragma once
 
 #include <cstdint>
@@ -26,8 +26,8 @@ inline constexpr Range kNotNegative{0, std::numeric_limits<double>::max()};
 inline constexpr Range kFraction{0, 1};
 
 // One table of a configuration file. Reading a key marks it as known. The overloads without a default throw
-// InputError where the key is missing; all throw InputError where the value doesn't fit. An integer where a real
-// number is expected is a real number. Not finite (TOML's nan, inf) is out of every range.
+// InputError where the key is missing; all throw InputError where the value doesn't fit. An integer where a
+// real number is expected is a real number. Not finite (TOML's nan, inf) is out of every range.
 class ConfigTable {
  public:
   bool Has(std::string_view key) const;
@@ -43,8 +43,8 @@ class ConfigTable {
   std::string Choice(std::string_view key, const std::vector<std::string>& choices) const;
   std::string Choice(std::string_view key, const std::string& otherwise,
                      const std::vector<std::string>& choices) const;
-  // A path; a relative one counts from the folder of the file that names it, from the working folder where it was
-  // set on the command line.
+  // A path; a relative one counts from the folder of the file that names it, from the working folder where it
+  // was set on the command line.
   std::filesystem::path Path(std::string_view key) const;
   // An array of numbers; size 0 = any length.
   std::vector<double> Numbers(std::string_view key, size_t size = 0, Range range = kAny) const;
@@ -52,8 +52,8 @@ class ConfigTable {
   Vec3d Vector(std::string_view key, Range range = kAny) const;
   Vec3d Vector(std::string_view key, const Vec3d& otherwise, Range range = kAny) const;
 
-  // A sub-table. Table() throws where it is missing; Optional() answers nothing, so that an effect that a scene
-  // doesn't name isn't built. Tables() reads an array of tables, empty where it is missing.
+  // A sub-table. Table() throws where it is missing; Optional() answers nothing, so that an effect that a
+  // scene doesn't name isn't built. Tables() reads an array of tables, empty where it is missing.
   ConfigTable Table(std::string_view key) const;
   std::optional<ConfigTable> Optional(std::string_view key) const;
   std::vector<ConfigTable> Tables(std::string_view key) const;
@@ -71,16 +71,17 @@ class ConfigTable {
 // A configuration file with the command line's settings on top.
 class Config {
  public:
-  // settings: "path.to.key=value", the value in TOML's notation, a bare word being a string; an index into an array
-  // of tables is a number ("light.source.0.spread=2").
+  // settings: "path.to.key=value", the value in TOML's notation, a bare word being a string; an index into an
+  // array of tables is a number ("light.source.0.spread=2").
   static Config Read(const std::filesystem::path& file, const std::vector<std::string>& settings = {});
   // `name` stands for the file in messages; relative paths count from `folder`.
-  static Config Parse(std::string_view text, const std::string& name, const std::filesystem::path& folder = {},
+  static Config Parse(std::string_view text, const std::string& name,
+                      const std::filesystem::path& folder = {},
                       const std::vector<std::string>& settings = {});
 
   ConfigTable root() const;
-  // Throws InputError for the first key that nobody has asked for, with the nearest known key of that table as a
-  // suggestion. Call it when everything has been read.
+  // Throws InputError for the first key that nobody has asked for, with the nearest known key of that table
+  // as a suggestion. Call it when everything has been read.
   void RejectUnknown() const;
 
  private:

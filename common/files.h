@@ -7,8 +7,8 @@
 
 namespace lumen {
 
-// The temporary name under which a file is written, with the target's extension (writers choose their format by
-// it). Commit() renames it to the target; without it the destructor removes the temporary.
+// The temporary name under which a file is written, with the target's extension (writers choose their format
+// by it). Commit() renames it to the target; without it the destructor removes the temporary.
 class PendingFile {
  public:
   explicit PendingFile(std::filesystem::path target);

@@ -29,29 +29,30 @@ using Image8 = Image<uint8_t>;
 using Image16 = Image<uint16_t>;
 using ImageF = Image<float>;
 
-// Reads the file's first `channels` channels. Integer files keep their own steps: a file of another depth than T is
-// an InputError, as are a missing, truncated or unreadable file and one with fewer channels (naming the file and
-// what was found). A grey PNG read as 3 channels is repeated; an alpha channel is left out.
+// Reads the file's first `channels` channels. Integer files keep their own steps: a file of another depth
+// than T is an InputError, as are a missing, truncated or unreadable file and one with fewer channels (naming
+// the file and what was found). A grey PNG read as 3 channels is repeated; an alpha channel is left out.
 Image8 ReadImage8(const std::filesystem::path& file, int channels);
 Image16 ReadImage16(const std::filesystem::path& file, int channels);
 ImageF ReadImageF(const std::filesystem::path& file, int channels);
 
-// Writes an image whole or not at all; the extension chooses the format (TIFF without compression, as C3VD's).
-// Throws InputError.
+// Writes an image whole or not at all; the extension chooses the format (TIFF without compression, as
+// C3VD's). Throws InputError.
 void WriteImage(const std::filesystem::path& file, const Image8& image);
 void WriteImage(const std::filesystem::path& file, const Image16& image);
 
 // A float32 EXR with named channels ("radiance.R", "z", …); image.channels names, in order.
-void WriteExr(const std::filesystem::path& file, const ImageF& image, const std::vector<std::string>& channel_names);
-// Reads any float EXR, with the names of its channels, in the order in which EXR readers give them (not always that
-// of writing). Throws InputError.
+void WriteExr(const std::filesystem::path& file, const ImageF& image,
+              const std::vector<std::string>& channel_names);
+// Reads any float EXR, with the names of its channels, in the order in which EXR readers give them (not
+// always that of writing). Throws InputError.
 ImageF ReadExr(const std::filesystem::path& file, std::vector<std::string>* channel_names);
 
 // Width and height without reading the pixels. Throws InputError.
 void ReadImageSize(const std::filesystem::path& file, int* width, int* height);
 
-// Writes text into an 8-bit RGB image, its base line starting at (x, y). Does nothing where the machine has no
-// font.
+// Writes text into an 8-bit RGB image, its base line starting at (x, y). Does nothing where the machine has
+// no font.
 void DrawText(Image8* image, int x, int y, int size_px, const std::string& text, const uint8_t rgb[3]);
 
 }  // namespace lumen

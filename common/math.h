@@ -21,8 +21,8 @@ using Vec3d = Vec3<double>;
 using Vec3i = Vec3<int>;
 using Mat3d = Mat3<double>;
 
-// A rigid motion. Named by what it maps: Pose world_from_camera takes camera axes (OpenCV's: +x right, +y down,
-// +z forward) to world axes, both in mm.
+// A rigid motion. Named by what it maps: Pose world_from_camera takes camera axes (OpenCV's: +x right, +y
+// down, +z forward) to world axes, both in mm.
 using Pose = Eigen::Isometry3d;
 
 inline constexpr double kPi = std::numbers::pi;

@@ -1,4 +1,5 @@
-// One line on a terminal that says how far a job is and how long it will take. Silent when stderr is no terminal.
+// One line on a terminal that says how far a job is and how long it will take. Silent when stderr is no
+// terminal.
 #pragma once
 
 #include <chrono>
@@ -19,8 +20,8 @@ class Progress {
   explicit Progress(std::string what);
   ~Progress();  // clears the line
 
-  // done in [0, 1]; note is shown behind the time left ("loss 0.0123"). May be called from any thread, as often as
-  // one likes: it redraws ten times a second at most.
+  // done in [0, 1]; note is shown behind the time left ("loss 0.0123"). May be called from any thread, as
+  // often as one likes: it redraws ten times a second at most.
   void Update(double done, const std::string& note = "");
 
  private:

@@ -1,13 +1,13 @@
-// Random numbers as a function of (seed, pixel, sample, dimension): no state, so neither threads, nor tiles, nor
-// an effect that draws numbers of its own can change anybody else's.
+// Random numbers as a function of (seed, pixel, sample, dimension): no state, so neither threads, nor tiles,
+// nor an effect that draws numbers of its own can change anybody else's.
 #pragma once
 
 #include <cstdint>
 
 namespace lumen {
 
-// A bijective mixer of 64 bits (the finaliser of SplitMix64: Steele, Lea, Flood, "Fast splittable pseudorandom
-// number generators", OOPSLA 2014).
+// A bijective mixer of 64 bits (the finaliser of SplitMix64: Steele, Lea, Flood, "Fast splittable
+// pseudorandom number generators", OOPSLA 2014).
 constexpr uint64_t Mix64(uint64_t x) {
   x += 0x9e3779b97f4a7c15ull;
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;

@@ -42,10 +42,10 @@ struct Sequence {
   std::filesystem::path ground_truth_mesh;  // empty = none
 };
 
-// Reads sequence.toml (or falls back to C3VD's calibration), calibration.toml on top where there is one ([light],
-// [response] and [frames] gain, each in place of the sequence's own), pose.txt,
-// and finds the frames' files, in the layout of C3VD v1 or v2. Pixels are not read. Throws InputError naming file
-// and place: unknown or missing keys, a pose line short of numbers or no rotation (not orthonormal within 1e-3),
+// Reads sequence.toml (or falls back to C3VD's calibration), calibration.toml on top where there is one
+// ([light], [response] and [frames] gain, each in place of the sequence's own), pose.txt, and finds the
+// frames' files, in the layout of C3VD v1 or v2. Pixels are not read. Throws InputError naming file and
+// place: unknown or missing keys, a pose line short of numbers or no rotation (not orthonormal within 1e-3),
 // fewer poses or gains than colour files, no frame at all, a mask of another size.
 Sequence ReadSequence(const std::filesystem::path& folder);
 
@@ -53,7 +53,8 @@ Sequence ReadSequence(const std::filesystem::path& folder);
 // written relative to the folder.
 void WriteSequenceHeader(const Sequence& sequence);
 
-// The file of frame `number` with one of C3VD's suffixes ("color.png", "depth.tiff", …): folder/0012_color.png.
+// The file of frame `number` with one of C3VD's suffixes ("color.png", "depth.tiff", …):
+// folder/0012_color.png.
 std::filesystem::path FrameFile(const std::filesystem::path& folder, int number, const std::string& suffix);
 
 // Colour of a frame, 8-bit RGB, checked against the camera's size.
@@ -63,11 +64,11 @@ Image8 ReadColor(const Sequence& sequence, const SequenceFrame& frame);
 Image8 ValidPixels(const Calibration& calibration);
 
 // C3VD's encodings. Nothing (no surface) is NaN in float images and 0 in all channels of the files.
-Image16 EncodeDepth(const ImageF& z_mm);            // floor(65535·z/100); beyond 100 mm: 65535
-ImageF DecodeDepth(const Image16& encoded);         // mm at the middle of the step; beyond: +infinity; nothing: NaN
-Image16 EncodeNormals(const ImageF& normal);        // v = (n + 1)/2·65535, rounded
+Image16 EncodeDepth(const ImageF& z_mm);      // floor(65535·z/100); beyond 100 mm: 65535
+ImageF DecodeDepth(const Image16& encoded);   // mm at the middle of the step; beyond: +infinity; nothing: NaN
+Image16 EncodeNormals(const ImageF& normal);  // v = (n + 1)/2·65535, rounded
 ImageF DecodeNormals(const Image16& encoded);
-Image16 EncodeFlow(const ImageF& flow_px);          // v = (px + 20)/40·65535, rounded, clipped; third channel 0
-ImageF DecodeFlow(const Image16& encoded);          // two channels
+Image16 EncodeFlow(const ImageF& flow_px);  // v = (px + 20)/40·65535, rounded, clipped; third channel 0
+ImageF DecodeFlow(const Image16& encoded);  // two channels
 
 }  // namespace lumen

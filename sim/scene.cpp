@@ -6,7 +6,7 @@
 #include "common/config.h"
 #include "common/error.h"
 #include "common/random.h"
-#include "sim/trajectory.h"
+#include "sim/trajectory/trajectory.h"
 
 namespace lumen {
 namespace {
@@ -30,8 +30,9 @@ CameraIntrinsics ReadSceneCamera(const ConfigTable& table) {
   }
 }
 
-// The octagon that C3VD's scope shows, in parts of the image: its corners are cut off along the lines from 15.04% of
-// the width to 23.29% of the height (measured on the data set's official mask, 1350×1080, to half a pixel).
+// The octagon that C3VD's scope shows, in parts of the image: its corners are cut off along the lines
+// from 15.04% of the width to 23.29% of the height (measured on the data set's official mask, 1350×1080, to
+// half a pixel).
 Image8 OctagonMask(int width, int height) {
   constexpr double kCutX = 203.0 / 1350, kCutY = 251.5 / 1080;
   Image8 mask(width, height, 1);
@@ -107,7 +108,8 @@ void CheckLightInLumen(const Scene& scene, const std::filesystem::path& file) {
       if (source.position.isZero(0)) continue;
       const Vec3f from = wall.ToLocal(pose.translation());
       if (wall.Occluded(from, wall.ToLocal(pose * source.position) - from, 0, 1)) {
-        throw InputError(file.string() + ": frame " + std::to_string(frame) + ": a light source lies behind the wall; " +
+        throw InputError(file.string() + ": frame " + std::to_string(frame) +
+                         ": a light source lies behind the wall; " +
                          "keep the camera farther from it (trajectory.clearance_mm)");
       }
     }
@@ -117,8 +119,9 @@ void CheckLightInLumen(const Scene& scene, const std::filesystem::path& file) {
 }  // namespace
 
 const std::vector<std::string>& ExactChannels() {
-  static const std::vector<std::string> channels = {"radiance", "direct",   "indirect", "albedo", "z",
-                                                    "distance", "normal",   "position", "flow",   "seen_before"};
+  static const std::vector<std::string> channels = {"radiance", "direct",     "indirect", "albedo",
+                                                    "z",        "distance",   "normal",   "position",
+                                                    "flow",     "seen_before"};
   return channels;
 }
 

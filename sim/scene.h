@@ -6,10 +6,10 @@
 #include <vector>
 
 #include "common/sequence.h"
-#include "sim/geometry.h"
-#include "sim/path.h"
-#include "sim/sensor.h"
-#include "sim/surface.h"
+#include "sim/geometry/geometry.h"
+#include "sim/imaging/path.h"
+#include "sim/imaging/sensor.h"
+#include "sim/imaging/surface.h"
 
 namespace lumen {
 
@@ -29,8 +29,8 @@ struct Scene {
   std::vector<std::string> effects;  // that the scene names, for reports
 };
 
-// Reads a scene file (scenes/README.md) and builds its geometry and trajectory. settings: "path.to.key=value". Throws
-// InputError with file, line and remedy.
+// Reads a scene file (scenes/README.md) and builds its geometry and trajectory. settings:
+// "path.to.key=value". Throws InputError with file, line and remedy.
 Scene ReadScene(const std::filesystem::path& file, const std::vector<std::string>& settings, uint64_t seed);
 
 // Names that [truth] exact may hold.

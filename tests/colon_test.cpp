@@ -1,4 +1,4 @@
-#include "sim/colon.h"
+#include "sim/geometry/colon.h"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +10,8 @@
 
 #include "common/error.h"
 #include "common/parallel.h"
-#include "sim/centreline.h"
-#include "sim/clearance.h"
+#include "sim/geometry/centreline.h"
+#include "sim/geometry/clearance.h"
 #include "tests/mesh_checks.h"
 
 namespace lumen {

@@ -7,9 +7,9 @@
 #include "common/files.h"
 #include "common/image.h"
 #include "common/mesh.h"
-#include "recon/colormap.h"
-#include "recon/evaluate.h"
-#include "recon/evaluation_json.h"
+#include "recon/evaluation/colormap.h"
+#include "recon/evaluation/evaluate.h"
+#include "recon/evaluation/evaluation_json.h"
 #include "tests/evaluation_scenes.h"
 #include "tests/support.h"
 

@@ -1,4 +1,4 @@
-#include "recon/evaluate.h"
+#include "recon/evaluation/evaluate.h"
 
 #include <gtest/gtest.h>
 
@@ -10,8 +10,8 @@
 
 #include "common/error.h"
 #include "common/parallel.h"
-#include "recon/evaluation_json.h"
-#include "recon/evaluation_table.h"
+#include "recon/evaluation/evaluation_json.h"
+#include "recon/evaluation/evaluation_table.h"
 #include "tests/evaluation_scenes.h"
 #include "tests/support.h"
 

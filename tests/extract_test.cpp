@@ -1,4 +1,4 @@
-#include "recon/extract.h"
+#include "recon/surface/extract.h"
 
 #include <gtest/gtest.h>
 
@@ -19,11 +19,13 @@ FieldOptions SmallField() {
   return options;
 }
 
-// A field whose networks say nothing: its surface is the initial one, a capsule of radius 10 about a segment of 20 mm.
+// A field whose networks say nothing: its surface is the initial one, a capsule of radius 10 about a segment
+// of 20 mm.
 Mesh CapsuleMesh(double half_box_mm, double cell_mm) {
   const FieldOptions options = SmallField();
   const InitialSurface initial(options.initial, {Pose::Identity()}, Vec3d::Zero());
-  const Eigen::AlignedBox3d box(Vec3d::Constant(-half_box_mm), Vec3d(half_box_mm, half_box_mm, half_box_mm + 20));
+  const Eigen::AlignedBox3d box(Vec3d::Constant(-half_box_mm),
+                                Vec3d(half_box_mm, half_box_mm, half_box_mm + 20));
   const Field<float> field(options, initial, box);
   const std::vector<float> nothing(field.parameter_count(), 0.0f);
   return ExtractMesh(field, nothing.data(), kOrigin, {cell_mm});
@@ -32,7 +34,8 @@ Mesh CapsuleMesh(double half_box_mm, double cell_mm) {
 double Volume(const Mesh& mesh) {
   double six = 0;
   for (const Vec3i& f : mesh.faces) {
-    six += (mesh.vertices[f[0]] - kOrigin).dot((mesh.vertices[f[1]] - kOrigin).cross(mesh.vertices[f[2]] - kOrigin));
+    six += (mesh.vertices[f[0]] - kOrigin)
+               .dot((mesh.vertices[f[1]] - kOrigin).cross(mesh.vertices[f[2]] - kOrigin));
   }
   return six / 6;
 }
@@ -56,7 +59,8 @@ TEST(Extract, CapsuleIsClosedAndWhereItShouldBe) {
   for (const Vec3d& vertex : mesh.vertices) {
     const Vec3d local = vertex - kOrigin;
     const double along = std::clamp(local.z(), 0.0, 20.0);
-    // A chord of an edge (at most √3 cells) bulges by edge²/(8·radius); a vertex may be moved by 1% of an edge.
+    // A chord of an edge (at most √3 cells) bulges by edge²/(8·radius); a vertex may be moved by 1% of an
+    // edge.
     const double bound = 3 * cell * cell / 80 + 0.01 * std::sqrt(3.0) * cell + 1e-4;
     EXPECT_NEAR((local - Vec3d(0, 0, along)).norm(), 10, bound);
   }

@@ -4,8 +4,8 @@
 #include <cmath>
 
 #include "common/random.h"
-#include "recon/ray_loss.h"
-#include "recon/volume.h"
+#include "recon/surface/volume.h"
+#include "recon/training/ray_loss.h"
 
 namespace lumen {
 namespace {
@@ -24,8 +24,8 @@ double Dot(const Panel<double>& a, const Panel<double>& b) {
   return sum;
 }
 
-// Central difference of f at x, where f has size about 1: steps of 1e-5 leave 1e-10 of truncation (times the third
-// derivative) and 1e-11 of rounding.
+// Central difference of f at x, where f has size about 1: steps of 1e-5 leave 1e-10 of truncation (times the
+// third derivative) and 1e-11 of rounding.
 template <class F>
 double Difference(F f, double* x, double step = 1e-5) {
   const double kept = *x;
@@ -47,7 +47,8 @@ TEST_P(MlpGradients, MatchFiniteDifferences) {
   mlp.Initialise(5, 1, parameters.data());
   uint64_t state = 11;
   for (double& p : parameters) p += 0.1 * Random(state);
-  Panel<double> input(shape.inputs, 2), by_output(shape.outputs, 2), by_gradient(shape.inputs, 2), input_delta;
+  Panel<double> input(shape.inputs, 2), by_output(shape.outputs, 2), by_gradient(shape.inputs, 2),
+      input_delta;
   Fill(&input, state);
   Fill(&by_output, state, 0.1);
   Fill(&by_gradient, state, 0.1);
@@ -58,7 +59,8 @@ TEST_P(MlpGradients, MatchFiniteDifferences) {
     return Dot(pass.value.back(), by_output) + Dot(pass.input_gradient, by_gradient);
   };
   loss();
-  mlp.BackwardSecondOrder(parameters.data(), input, by_output, by_gradient, &pass, gradient.data(), &input_delta);
+  mlp.BackwardSecondOrder(parameters.data(), input, by_output, by_gradient, &pass, gradient.data(),
+                          &input_delta);
   for (size_t i = 0; i < parameters.size(); i += 3) {
     const double expected = Difference(loss, &parameters[i]);
     EXPECT_NEAR(gradient[i], expected, 1e-6 * std::max(1.0, std::abs(expected))) << "parameter " << i;
@@ -107,14 +109,16 @@ TEST(Grid, JacobianAndTableGradientsMatchFiniteDifferences) {
   uint64_t state = 17;
   for (double& value : tables) value = Random(state);
   Panel<double> positions(3, 1), encoding(grid.outputs(), 1), jacobian(3 * grid.outputs(), 1);
-  Panel<double> delta(grid.outputs(), 1), pull(grid.outputs(), 1), direction(3, 1), by_jacobian(3 * grid.outputs(), 1);
+  Panel<double> delta(grid.outputs(), 1), pull(grid.outputs(), 1), direction(3, 1),
+      by_jacobian(3 * grid.outputs(), 1);
   Fill(&positions, state, 19);
   Fill(&delta, state, 0.1);
   Fill(&pull, state, 0.1);
   Fill(&direction, state);
   for (int d = 0; d < 3; ++d)
     for (int r = 0; r < grid.outputs(); ++r)
-      for (int s = 0; s < kTile; ++s) by_jacobian.Row(0, d * grid.outputs() + r)[s] = direction.Row(0, d)[s] * pull.Row(0, r)[s];
+      for (int s = 0; s < kTile; ++s)
+        by_jacobian.Row(0, d * grid.outputs() + r)[s] = direction.Row(0, d)[s] * pull.Row(0, r)[s];
   auto loss = [&] {
     grid.EncodeWithJacobian(tables.data(), positions, &encoding, &jacobian);
     return Dot(encoding, delta) + Dot(jacobian, by_jacobian);
@@ -123,7 +127,8 @@ TEST(Grid, JacobianAndTableGradientsMatchFiniteDifferences) {
   for (int l = 0; l < grid.levels(); ++l)
     grid.BackwardSecondOrder(l, positions, delta, pull, direction, kTile, gradient.data());
   for (size_t i = 0; i < tables.size(); i += 7) {
-    EXPECT_NEAR(gradient[i], Difference(loss, &tables[i], 1e-4), 1e-9) << "entry " << i;  // linear in the tables
+    EXPECT_NEAR(gradient[i], Difference(loss, &tables[i], 1e-4), 1e-9)
+        << "entry " << i;  // linear in the tables
   }
   const Panel<double> slopes = jacobian;
   Panel<double> plain(grid.outputs(), 1);
@@ -139,8 +144,8 @@ TEST(Grid, JacobianAndTableGradientsMatchFiniteDifferences) {
   }
 }
 
-// The integral of the density seen by a ray in NeuS's closed form: with f falling linearly through 0, what passes is
-// Φ(s·f_last)/Φ(s·f_first).
+// The integral of the density seen by a ray in NeuS's closed form: with f falling linearly through 0, what
+// passes is Φ(s·f_last)/Φ(s·f_first).
 TEST(Volume, WeightsTelescope) {
   const double f[] = {3, 2.2, 1, 0.4, -0.1, -0.5, -2};
   double transmittance[7], weight[7];
@@ -216,7 +221,8 @@ TEST(Shading, DerivativesMatchFiniteDifferences) {
     for (int c = 0; c < 3; ++c) {
       auto radiance = [&] { return Shade(kind, output, normal, light, point).radiance[c]; };
       EXPECT_NEAR(shading.by_output[c], Difference(radiance, &output[c]), 1e-9);
-      for (int d = 0; d < 3; ++d) EXPECT_NEAR(shading.by_normal(c, d), Difference(radiance, &normal[d]), 1e-9);
+      for (int d = 0; d < 3; ++d)
+        EXPECT_NEAR(shading.by_normal(c, d), Difference(radiance, &normal[d]), 1e-9);
     }
   }
 }
@@ -269,8 +275,8 @@ TEST_P(RayLossGradient, MatchesFiniteDifferences) {
   std::vector<double> unused(field.network_size());
   double unused_gain;
   auto loss = [&] {
-    const LossTerms terms = ray_loss.Evaluate(parameters.data(), batch, lights, log_gain, settings, unused.data(),
-                                              &(unused_gain = 0));
+    const LossTerms terms = ray_loss.Evaluate(parameters.data(), batch, lights, log_gain, settings,
+                                              unused.data(), &(unused_gain = 0));
     return terms.photometric + terms.eikonal + terms.albedo;
   };
   std::vector<double> gradient;
@@ -301,15 +307,16 @@ TEST_P(RayLossGradient, MatchesFiniteDifferences) {
     EXPECT_NEAR(gain_gradient, Difference(loss, &log_gain[0]), 1e-7);
   }
   if (GetParam() != Reflectance::kLambertian) return;
-  // The pull on the albedo acts on the colour network (the last parameters: 10·(5 + 3) + 10 + 3·10 + 3) and not on
-  // the weights of the samples.
+  // The pull on the albedo acts on the colour network (the last parameters: 10·(5 + 3) + 10 + 3·10 + 3) and
+  // not on the weights of the samples.
   const std::vector<double> without = gradient;
   settings.albedo_weight = 0.3;
   analytic();
   for (size_t i = parameters.size() - 123; i < parameters.size(); ++i) compare(i);
   // Nor does it push the level, which the last biases set.
   EXPECT_GT(std::abs(gradient[parameters.size() - 100] - without[parameters.size() - 100]), 1e-6);
-  for (size_t i = parameters.size() - 3; i < parameters.size(); ++i) EXPECT_NEAR(gradient[i], without[i], 1e-12);
+  for (size_t i = parameters.size() - 3; i < parameters.size(); ++i)
+    EXPECT_NEAR(gradient[i], without[i], 1e-12);
 }
 
 INSTANTIATE_TEST_SUITE_P(Reflectances, RayLossGradient,

@@ -1,4 +1,4 @@
-#include "sim/mesh_source.h"
+#include "sim/geometry/mesh_source.h"
 
 #include <gtest/gtest.h>
 
@@ -9,9 +9,9 @@
 
 #include "common/error.h"
 #include "common/files.h"
-#include "sim/centreline.h"
-#include "sim/mesh_repair.h"
-#include "sim/trajectory.h"
+#include "sim/geometry/centreline.h"
+#include "sim/geometry/mesh_repair.h"
+#include "sim/trajectory/trajectory.h"
 #include "tests/mesh_checks.h"
 #include "tests/support.h"
 

@@ -1,4 +1,4 @@
-#include "sim/path.h"
+#include "sim/imaging/path.h"
 
 #include <gtest/gtest.h>
 

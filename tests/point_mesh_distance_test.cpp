@@ -1,4 +1,4 @@
-#include "recon/point_mesh_distance.h"
+#include "recon/evaluation/point_mesh_distance.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 
 #include "common/error.h"
 #include "common/random.h"
-#include "recon/nearest_point.h"
+#include "recon/evaluation/nearest_point.h"
 #include "tests/evaluation_scenes.h"
 
 namespace lumen {

@@ -1,11 +1,11 @@
-#include "recon/portrait.h"
+#include "recon/evaluation/portrait.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
 #include "common/parallel.h"
-#include "recon/layout.h"
+#include "recon/evaluation/layout.h"
 #include "tests/evaluation_scenes.h"
 
 namespace lumen {

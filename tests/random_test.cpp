@@ -24,8 +24,8 @@ TEST(Random, UniformStaysBelowOne) {
   EXPECT_LT(UniformDouble(~0ull), 1.0);
 }
 
-// Over neighbouring pixels, samples and dimensions the numbers are uniform: χ² over 64 bins of 3 × 65536 numbers,
-// 63 degrees of freedom; mean 63, standard deviation √126, bound at five of them.
+// Over neighbouring pixels, samples and dimensions the numbers are uniform: χ² over 64 bins of 3 × 65536
+// numbers, 63 degrees of freedom; mean 63, standard deviation √126, bound at five of them.
 TEST(Random, NeighbouringCoordinatesAreUniform) {
   for (int axis = 0; axis < 3; ++axis) {
     int bins[64] = {};

@@ -1,4 +1,4 @@
-#include "sim/sampler.h"
+#include "sim/imaging/sampler.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "sim/sensor.h"
+#include "sim/imaging/sensor.h"
 
 #include <gtest/gtest.h>
 

@@ -15,9 +15,9 @@ namespace lumen::test {
 std::filesystem::path SharedData(const std::string& relative);
 
 // Skips a test, saying why, where the shared data is absent.
-#define LUMEN_NEEDS_DATA(relative)                        \
-  if (!std::filesystem::exists(SharedData(relative))) {   \
-    GTEST_SKIP() << "no " << SharedData(relative);        \
+#define LUMEN_NEEDS_DATA(relative)                      \
+  if (!std::filesystem::exists(SharedData(relative))) { \
+    GTEST_SKIP() << "no " << SharedData(relative);      \
   }
 
 // The message of the InputError that the body throws; empty where it throws none.

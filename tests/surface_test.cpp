@@ -1,4 +1,4 @@
-#include "sim/surface.h"
+#include "sim/imaging/surface.h"
 
 #include <gtest/gtest.h>
 

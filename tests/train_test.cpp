@@ -1,5 +1,5 @@
 // A whole run, small: the same bytes for any number of threads, and for a run that was killed and resumed.
-#include "recon/train.h"
+#include "recon/training/train.h"
 
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -10,7 +10,7 @@
 #include "common/files.h"
 #include "common/parallel.h"
 #include "common/progress.h"
-#include "recon/checkpoint.h"
+#include "recon/training/checkpoint.h"
 #include "sim/render.h"
 #include "tests/support.h"
 
@@ -25,8 +25,8 @@ const Sequence& SmallSequence() {
   static const Sequence sequence = [] {
     SetQuiet(true);
     const Scene scene = ReadScene(LUMEN_SOURCE_FOLDER "/scenes/colon.toml",
-                                  {"camera.width=90", "camera.height=72", "trajectory.frames=6", "path.samples=1",
-                                   "geometry.tolerance_mm=0.3", "truth.c3vd=false"},
+                                  {"camera.width=90", "camera.height=72", "trajectory.frames=6",
+                                   "path.samples=1", "geometry.tolerance_mm=0.3", "truth.c3vd=false"},
                                   0);
     RenderOptions options;
     options.folder = folder / "sequence";
@@ -64,9 +64,13 @@ pid_t StartTraining(const std::filesystem::path& folder, bool resume) {
   const std::string sequence = SmallSequence().folder.string(), out = folder.string();
   const pid_t child = fork();
   if (child == 0) {
-    std::vector<const char*> arguments = {"lumen", "train", sequence.c_str(), "-o", out.c_str(), "--quiet",
-                                          "--iterations", "120", "--set", "sampling.rays=96", "--set",
-                                          "extract.cell_mm=3", "--set", "schedule.checkpoint_seconds=0"};
+    std::vector<const char*> arguments = {"lumen",          "train",
+                                          sequence.c_str(), "-o",
+                                          out.c_str(),      "--quiet",
+                                          "--iterations",   "120",
+                                          "--set",          "sampling.rays=96",
+                                          "--set",          "extract.cell_mm=3",
+                                          "--set",          "schedule.checkpoint_seconds=0"};
     if (resume) arguments.push_back("--resume");
     arguments.push_back(nullptr);
     if (!freopen("/dev/null", "w", stdout)) _exit(3);

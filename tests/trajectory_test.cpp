@@ -1,4 +1,4 @@
-#include "sim/trajectory.h"
+#include "sim/trajectory/trajectory.h"
 
 #include <gtest/gtest.h>
 
@@ -10,9 +10,9 @@
 #include "common/error.h"
 #include "common/files.h"
 #include "common/random.h"
-#include "sim/centreline.h"
-#include "sim/clearance.h"
-#include "sim/recorded_path.h"
+#include "sim/geometry/centreline.h"
+#include "sim/geometry/clearance.h"
+#include "sim/trajectory/recorded_path.h"
 #include "tests/mesh_checks.h"
 #include "tests/support.h"
 

@@ -1,4 +1,4 @@
-#include "recon/visibility.h"
+#include "recon/evaluation/visibility.h"
 
 #include <gtest/gtest.h>
 

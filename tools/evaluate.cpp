@@ -1,12 +1,12 @@
-#include "recon/evaluate.h"
+#include "recon/evaluation/evaluate.h"
 
 #include <iostream>
 
 #include "common/files.h"
 #include "common/progress.h"
-#include "recon/evaluation_json.h"
-#include "recon/evaluation_table.h"
-#include "recon/sheet.h"
+#include "recon/evaluation/evaluation_json.h"
+#include "recon/evaluation/evaluation_table.h"
+#include "recon/evaluation/sheet.h"
 #include "tools/options.h"
 
 namespace lumen {

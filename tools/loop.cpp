@@ -2,10 +2,10 @@
 
 #include "common/files.h"
 #include "common/progress.h"
-#include "recon/evaluate.h"
-#include "recon/evaluation_json.h"
-#include "recon/evaluation_table.h"
-#include "recon/sheet.h"
+#include "recon/evaluation/evaluate.h"
+#include "recon/evaluation/evaluation_json.h"
+#include "recon/evaluation/evaluation_table.h"
+#include "recon/evaluation/sheet.h"
 #include "tools/options.h"
 #include "tools/render_arguments.h"
 #include "tools/train_arguments.h"
@@ -25,14 +25,16 @@ nlohmann::json RunLoop(const Arguments& arguments, const CommonOptions& common) 
   const std::filesystem::path sequence_folder = arguments.folder / "sequence";
 
   const RenderResult rendered = RunRender(arguments.render, common.seed, sequence_folder);
-  Say("rendered " + std::to_string(rendered.frames) + " frames in " + std::to_string(rendered.seconds) + " s");
+  Say("rendered " + std::to_string(rendered.frames) + " frames in " + std::to_string(rendered.seconds) +
+      " s");
 
   const Sequence sequence = ReadSequence(sequence_folder);
   TrainRun run;
   run.folder = arguments.folder;
   run.seed = common.seed;
   const TrainResult trained = Train(sequence, options, run);
-  Say("trained " + std::to_string(trained.iterations) + " iterations in " + std::to_string(trained.seconds) + " s");
+  Say("trained " + std::to_string(trained.iterations) + " iterations in " + std::to_string(trained.seconds) +
+      " s");
 
   const Mesh reconstruction = ReadMesh(arguments.folder / "mesh.ply");
   const Mesh truth = ReadGroundTruth(sequence);
@@ -50,11 +52,13 @@ nlohmann::json RunLoop(const Arguments& arguments, const CommonOptions& common) 
 
 void AddLoop(CLI::App* app) {
   auto arguments = std::make_shared<Arguments>();
-  auto* command = AddSubcommand(app, "loop", "renders, trains and evaluates a scene",
-                                [arguments](const CommonOptions& common) { return RunLoop(*arguments, common); });
+  auto* command =
+      AddSubcommand(app, "loop", "renders, trains and evaluates a scene",
+                    [arguments](const CommonOptions& common) { return RunLoop(*arguments, common); });
   command->add_option("scene", arguments->render.scene, "scene file (see scenes/README.md)")->required();
   command->add_option("--set", arguments->render.settings, "a key of the scene: path.to.key=value");
-  command->add_option("-o", arguments->folder, "folder for the sequence, the mesh and the evaluation")->required();
+  command->add_option("-o", arguments->folder, "folder for the sequence, the mesh and the evaluation")
+      ->required();
   AddTrainArguments(command, &arguments->train, "--train-set");
 }
 

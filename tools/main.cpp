@@ -1,4 +1,5 @@
-// lumen: renders a colon as an endoscope sees it, reconstructs it, and says by how many millimetres it is off.
+// lumen: renders a colon as an endoscope sees it, reconstructs it, and says by how many millimetres it is
+// off.
 
 #include <exception>
 #include <iostream>

@@ -16,8 +16,8 @@ struct CommonOptions {
   std::filesystem::path json;  // where the result for programs goes; empty = nowhere
 };
 
-// Adds a subcommand with --threads, --seed, --quiet and --json. `run` is called when the command line names it; what
-// it returns is written to --json. main() turns exceptions into exit codes.
+// Adds a subcommand with --threads, --seed, --quiet and --json. `run` is called when the command line names
+// it; what it returns is written to --json. main() turns exceptions into exit codes.
 CLI::App* AddSubcommand(CLI::App* app, const std::string& name, const std::string& description,
                         std::function<nlohmann::json(const CommonOptions&)> run);
 

@@ -11,14 +11,14 @@ void AddRender(CLI::App* app) {
     std::filesystem::path folder;
   };
   auto arguments = std::make_shared<Arguments>();
-  auto* command = AddSubcommand(
-      app, "render", "renders a scene to a sequence folder with its ground truth",
-      [arguments](const CommonOptions& common) {
-        const RenderResult result = RunRender(arguments->render, common.seed, arguments->folder);
-        std::cout << "rendered " << result.frames << " frames in " << result.seconds << " s to "
-                  << arguments->folder.string() << "\n";
-        return ToJson(result);
-      });
+  auto* command = AddSubcommand(app, "render", "renders a scene to a sequence folder with its ground truth",
+                                [arguments](const CommonOptions& common) {
+                                  const RenderResult result =
+                                      RunRender(arguments->render, common.seed, arguments->folder);
+                                  std::cout << "rendered " << result.frames << " frames in " << result.seconds
+                                            << " s to " << arguments->folder.string() << "\n";
+                                  return ToJson(result);
+                                });
   AddRenderArguments(command, &arguments->render);
   command->add_option("-o", arguments->folder, "folder of the sequence")->required();
 }

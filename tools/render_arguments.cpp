@@ -12,7 +12,8 @@ void ReadFrameRange(const std::string& text, RenderOptions* options) {
   int end = 0;
   char colon = 0;
   std::istringstream in(text);
-  if (!(in >> options->first_frame >> colon >> end) || colon != ':' || !in.eof() || end <= options->first_frame) {
+  if (!(in >> options->first_frame >> colon >> end) || colon != ':' || !in.eof() ||
+      end <= options->first_frame) {
     throw InputError("--frames " + text + ": give the first frame and the one after the last, as in 0:20");
   }
   options->last_frame = end;
@@ -33,8 +34,8 @@ RenderResult RunRender(const RenderArguments& arguments, uint64_t seed, const st
   ReadFrameRange(arguments.frames, &options);
   const RenderResult result = Render(ReadScene(arguments.scene, arguments.settings, seed), options);
   if (result.not_finite > 0) {
-    std::cerr << "lumen: " << result.not_finite << " samples were not finite and are left out; the first: "
-              << result.first_not_finite << "\n";
+    std::cerr << "lumen: " << result.not_finite
+              << " samples were not finite and are left out; the first: " << result.first_not_finite << "\n";
   }
   return result;
 }

@@ -17,11 +17,13 @@ void AddTrainArguments(CLI::App* command, TrainArguments* arguments, const std::
   std::string names;
   for (const std::string& name : PresetNames()) names += (names.empty() ? "" : ", ") + name;
   command->add_option("--preset", arguments->preset, "set of options: " + names)->capture_default_str();
-  auto* seconds = command->add_option("--seconds", arguments->seconds, "train for so long")->check(CLI::PositiveNumber);
+  auto* seconds =
+      command->add_option("--seconds", arguments->seconds, "train for so long")->check(CLI::PositiveNumber);
   command->add_option("--iterations", arguments->iterations, "train for so many steps")
       ->check(CLI::PositiveNumber)
       ->excludes(seconds);
-  command->add_option("--frames", arguments->frames, "frames to train on, taken uniformly")->check(CLI::PositiveNumber);
+  command->add_option("--frames", arguments->frames, "frames to train on, taken uniformly")
+      ->check(CLI::PositiveNumber);
   command->add_option(set_name, arguments->settings, "an option of training: path.to.key=value");
 }
 

@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "recon/train.h"
+#include "recon/training/train.h"
 
 namespace lumen {
 

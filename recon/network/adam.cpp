@@ -1,0 +1,35 @@
+#include "recon/network/adam.h"
+
+#include <cmath>
+
+namespace lumen {
+namespace {
+
+// Keeps 0/0 away from parameters that have never had a gradient. The smallest float gradient whose square is
+// not lost is about 1e-22; a denominator this much smaller than any that counts leaves Adam scale-free, as
+// hash tables with their tiny gradients need it (Müller et al. 2022).
+constexpr float kEpsilon = 1e-15f;
+
+}  // namespace
+
+AdamStep::AdamStep(double rate, int64_t step)
+    : rate(static_cast<float>(rate)),
+      first_correction(static_cast<float>(1 / (1 - std::pow(kAdamBeta1, static_cast<double>(step))))),
+      second_correction(static_cast<float>(1 / (1 - std::pow(kAdamBeta2, static_cast<double>(step))))) {}
+
+void AdamUpdate(const AdamStep& step, size_t count, float* __restrict parameter, float* __restrict gradient,
+                float* __restrict first, float* __restrict second) {
+  constexpr float b1 = kAdamBeta1, b2 = kAdamBeta2;
+  const float rate = step.rate * step.first_correction;
+  for (size_t i = 0; i < count; ++i) {
+    const float g = gradient[i];
+    const float m = b1 * first[i] + (1 - b1) * g;
+    const float v = b2 * second[i] + (1 - b2) * g * g;
+    first[i] = m;
+    second[i] = v;
+    parameter[i] -= rate * m / (std::sqrt(v * step.second_correction) + kEpsilon);
+    gradient[i] = 0;
+  }
+}
+
+}  // namespace lumen

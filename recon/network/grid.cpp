@@ -1,0 +1,204 @@
+#include "recon/network/grid.h"
+
+#include <cmath>
+
+#include "common/random.h"
+
+namespace lumen {
+
+template <class T>
+struct Grid<T>::Cell {
+  alignas(64) int32_t entry[8][kTile];  // corner c: bit d of c set = the upper corner along axis d
+  alignas(64) T fraction[3][kTile];     // position within the cell, 0…1
+};
+
+template <class T>
+Grid<T>::Grid(const GridOptions& options, const Eigen::AlignedBox3d& box) {
+  for (int d = 0; d < 3; ++d) low_[d] = static_cast<T>(box.min()[d]);
+  const double ratio = options.levels > 1 ? std::pow(options.finest_cell_mm / options.coarsest_cell_mm,
+                                                     1.0 / (options.levels - 1))
+                                          : 1.0;
+  for (int l = 0; l < options.levels; ++l) {
+    const double cell = options.coarsest_cell_mm * std::pow(ratio, l);
+    Level level;
+    level.inverse_cell = static_cast<T>(1 / cell);
+    double points = 1;
+    for (int d = 0; d < 3; ++d) {
+      level.corners[d] = static_cast<int32_t>(std::ceil(box.sizes()[d] / cell)) + 1;
+      points *= level.corners[d];
+    }
+    const double table = std::ldexp(1.0, options.log2_table_size);
+    level.dense = points <= table;
+    level.entries = static_cast<uint32_t>(level.dense ? points : table);
+    level.offset = parameter_count_;
+    parameter_count_ += size_t(level.entries) * kFeatures;
+    levels_.push_back(level);
+  }
+}
+
+template <class T>
+void Grid<T>::Initialise(uint64_t seed, T* tables) const {
+  for (size_t i = 0; i < parameter_count_; ++i) {
+    tables[i] = static_cast<T>(1e-4 * (2 * UniformDouble(RandomBits(seed, i)) - 1));
+  }
+}
+
+template <class T>
+void Grid<T>::Locate(const Level& level, const T* positions, Cell* cell) const {
+  alignas(64) int32_t base[3][kTile];
+  for (int d = 0; d < 3; ++d) {
+    const int32_t last_cell = level.corners[d] - 2;
+    for (int s = 0; s < kTile; ++s) {
+      const T x = (positions[d * kTile + s] - low_[d]) * level.inverse_cell;
+      int32_t i = static_cast<int32_t>(x);
+      i = i < 0 ? 0 : i;
+      i = i > last_cell ? last_cell : i;
+      T fraction = x - static_cast<T>(i);
+      fraction = fraction < 0 ? T(0) : fraction;
+      fraction = fraction > 1 ? T(1) : fraction;
+      base[d][s] = i;
+      cell->fraction[d][s] = fraction;
+    }
+  }
+  for (int c = 0; c < 8; ++c) {
+    const int32_t dx = c & 1, dy = (c >> 1) & 1, dz = c >> 2;
+    if (level.dense) {
+      const int32_t row = level.corners[0], slice = level.corners[0] * level.corners[1];
+      for (int s = 0; s < kTile; ++s) {
+        cell->entry[c][s] = base[0][s] + dx + row * (base[1][s] + dy) + slice * (base[2][s] + dz);
+      }
+    } else {
+      // The primes of Müller et al.
+      const uint32_t mask = level.entries - 1;
+      for (int s = 0; s < kTile; ++s) {
+        const uint32_t hash = static_cast<uint32_t>(base[0][s] + dx) ^
+                              static_cast<uint32_t>(base[1][s] + dy) * 2654435761u ^
+                              static_cast<uint32_t>(base[2][s] + dz) * 805459861u;
+        cell->entry[c][s] = static_cast<int32_t>(hash & mask);
+      }
+    }
+  }
+}
+
+template <class T>
+void Grid<T>::Encode(const T* tables, const Panel<T>& positions, Panel<T>* encoding) const {
+  Cell cell;
+  for (int tile = 0; tile < positions.tiles(); ++tile) {
+    for (int l = 0; l < levels(); ++l) {
+      const Level& level = levels_[l];
+      const T* table = tables + level.offset;
+      Locate(level, positions.Tile(tile), &cell);
+      for (int f = 0; f < kFeatures; ++f) {
+        T* out = encoding->Row(tile, l * kFeatures + f);
+        for (int s = 0; s < kTile; ++s) {
+          const T fx = cell.fraction[0][s], fy = cell.fraction[1][s], fz = cell.fraction[2][s];
+          const T v0 = table[2 * cell.entry[0][s] + f], v1 = table[2 * cell.entry[1][s] + f];
+          const T v2 = table[2 * cell.entry[2][s] + f], v3 = table[2 * cell.entry[3][s] + f];
+          const T v4 = table[2 * cell.entry[4][s] + f], v5 = table[2 * cell.entry[5][s] + f];
+          const T v6 = table[2 * cell.entry[6][s] + f], v7 = table[2 * cell.entry[7][s] + f];
+          const T v01 = v0 + fx * (v1 - v0), v23 = v2 + fx * (v3 - v2);
+          const T v45 = v4 + fx * (v5 - v4), v67 = v6 + fx * (v7 - v6);
+          const T low = v01 + fy * (v23 - v01), high = v45 + fy * (v67 - v45);
+          out[s] = low + fz * (high - low);
+        }
+      }
+    }
+  }
+}
+
+template <class T>
+void Grid<T>::EncodeWithJacobian(const T* tables, const Panel<T>& positions, Panel<T>* encoding,
+                                 Panel<T>* jacobian) const {
+  Cell cell;
+  alignas(64) T value[8][kTile];
+  for (int tile = 0; tile < positions.tiles(); ++tile) {
+    for (int l = 0; l < levels(); ++l) {
+      const Level& level = levels_[l];
+      const T* table = tables + level.offset;
+      Locate(level, positions.Tile(tile), &cell);
+      for (int f = 0; f < kFeatures; ++f) {
+        for (int c = 0; c < 8; ++c)
+          for (int s = 0; s < kTile; ++s) value[c][s] = table[2 * cell.entry[c][s] + f];
+        const int row = l * kFeatures + f;
+        T* out = encoding->Row(tile, row);
+        T* dx = jacobian->Row(tile, row);
+        T* dy = jacobian->Row(tile, outputs() + row);
+        T* dz = jacobian->Row(tile, 2 * outputs() + row);
+        for (int s = 0; s < kTile; ++s) {
+          const T fx = cell.fraction[0][s], fy = cell.fraction[1][s], fz = cell.fraction[2][s];
+          const T v00 = value[0][s] + fx * (value[1][s] - value[0][s]);
+          const T v10 = value[2][s] + fx * (value[3][s] - value[2][s]);
+          const T v01 = value[4][s] + fx * (value[5][s] - value[4][s]);
+          const T v11 = value[6][s] + fx * (value[7][s] - value[6][s]);
+          const T v0 = v00 + fy * (v10 - v00), v1 = v01 + fy * (v11 - v01);
+          const T d00 = value[1][s] - value[0][s], d10 = value[3][s] - value[2][s];
+          const T d01 = value[5][s] - value[4][s], d11 = value[7][s] - value[6][s];
+          const T d0 = d00 + fy * (d10 - d00), d1 = d01 + fy * (d11 - d01);
+          const T e0 = v10 - v00, e1 = v11 - v01;
+          out[s] = v0 + fz * (v1 - v0);
+          dx[s] = level.inverse_cell * (d0 + fz * (d1 - d0));
+          dy[s] = level.inverse_cell * (e0 + fz * (e1 - e0));
+          dz[s] = level.inverse_cell * (v1 - v0);
+        }
+      }
+    }
+  }
+}
+
+template <class T>
+template <bool kSecondOrder>
+void Grid<T>::BackwardImpl(int l, const Panel<T>& positions, const Panel<T>& delta, const Panel<T>* pull,
+                           const Panel<T>* direction, int count, T* gradient) const {
+  const Level& level = levels_[l];
+  T* table = gradient + level.offset;
+  Cell cell;
+  alignas(64) T share[8][kFeatures][kTile];
+  for (int tile = 0; tile * kTile < count; ++tile) {
+    Locate(level, positions.Tile(tile), &cell);
+    const T* delta0 = delta.Row(tile, l * kFeatures);
+    const T* delta1 = delta.Row(tile, l * kFeatures + 1);
+    for (int c = 0; c < 8; ++c) {
+      for (int s = 0; s < kTile; ++s) {
+        const T fx = cell.fraction[0][s], fy = cell.fraction[1][s], fz = cell.fraction[2][s];
+        const T wx = c & 1 ? fx : 1 - fx, wy = c & 2 ? fy : 1 - fy, wz = c & 4 ? fz : 1 - fz;
+        const T weight = wx * wy * wz;
+        share[c][0][s] = weight * delta0[s];
+        share[c][1][s] = weight * delta1[s];
+        if constexpr (kSecondOrder) {
+          const T* u = direction->Tile(tile);
+          const T along = level.inverse_cell * ((c & 1 ? u[s] : -u[s]) * wy * wz +
+                                                (c & 2 ? u[kTile + s] : -u[kTile + s]) * wx * wz +
+                                                (c & 4 ? u[2 * kTile + s] : -u[2 * kTile + s]) * wx * wy);
+          share[c][0][s] += along * pull->Row(tile, l * kFeatures)[s];
+          share[c][1][s] += along * pull->Row(tile, l * kFeatures + 1)[s];
+        }
+      }
+    }
+    const int samples = std::min(kTile, count - tile * kTile);
+    for (int s = 0; s < samples; ++s) {
+      for (int c = 0; c < 8; ++c) {
+        T* entry = table + 2 * cell.entry[c][s];
+        entry[0] += share[c][0][s];
+        entry[1] += share[c][1][s];
+      }
+    }
+  }
+}
+
+template <class T>
+void Grid<T>::Backward(int level, const Panel<T>& positions, const Panel<T>& delta, int count,
+                       T* gradient) const {
+  BackwardImpl<false>(level, positions, delta, nullptr, nullptr, count, gradient);
+}
+
+template <class T>
+void Grid<T>::BackwardSecondOrder(int level, const Panel<T>& positions, const Panel<T>& delta,
+                                  const Panel<T>& pull, const Panel<T>& direction, int count,
+                                  T* gradient) const {
+  BackwardImpl<true>(level, positions, delta, &pull, &direction, count, gradient);
+}
+
+template class Grid<float>;
+template class Grid<double>;
+
+}  // namespace lumen

@@ -1,0 +1,116 @@
+#include "recon/network/product.h"
+
+namespace lumen {
+namespace {
+
+// One vector register of the widest machine; narrower ones split it.
+template <class T>
+struct Lanes {
+  typedef T Vector __attribute__((vector_size(64)));
+  static constexpr int kCount = 64 / sizeof(T);
+  static constexpr int kPerRow = kTile / kCount;
+};
+
+// kRows rows of the result at a time: their sums stay in registers while the columns stream by.
+template <class T, int kRows>
+void MultiplyRows(const T* weight, size_t row_stride, size_t column_stride, const T* bias, int columns,
+                  const T* x, T* y) {
+  using Vector = typename Lanes<T>::Vector;
+  constexpr int kVectors = Lanes<T>::kPerRow;
+  Vector sum[kRows][kVectors];
+  for (int r = 0; r < kRows; ++r)
+    for (int v = 0; v < kVectors; ++v) sum[r][v] = Vector{} + (bias ? bias[r] : T(0));
+  const Vector* in = reinterpret_cast<const Vector*>(x);
+  for (int c = 0; c < columns; ++c, in += kVectors) {
+    for (int r = 0; r < kRows; ++r) {
+      const T w = weight[r * row_stride + c * column_stride];
+      for (int v = 0; v < kVectors; ++v) sum[r][v] += w * in[v];
+    }
+  }
+  Vector* out = reinterpret_cast<Vector*>(y);
+  for (int r = 0; r < kRows; ++r)
+    for (int v = 0; v < kVectors; ++v) out[r * kVectors + v] = sum[r][v];
+}
+
+template <class T>
+void MultiplyStrided(const T* weight, size_t row_stride, size_t column_stride, const T* bias, int rows,
+                     int columns, const T* x, T* y) {
+  int r = 0;
+  for (; r + 4 <= rows; r += 4) {
+    MultiplyRows<T, 4>(weight + r * row_stride, row_stride, column_stride, bias ? bias + r : nullptr, columns,
+                       x, y + r * kTile);
+  }
+  for (; r < rows; ++r) {
+    MultiplyRows<T, 1>(weight + r * row_stride, row_stride, column_stride, bias ? bias + r : nullptr, columns,
+                       x, y + r * kTile);
+  }
+}
+
+template <class T, int kOutputs, int kInputs>
+void AccumulateBlock(const Panel<T>& y, int first_output, const Panel<T>& x, int first_input, T* gradient) {
+  using Vector = typename Lanes<T>::Vector;
+  constexpr int kVectors = Lanes<T>::kPerRow;
+  Vector sum[kOutputs][kInputs] = {};
+  for (int tile = 0; tile < y.tiles(); ++tile) {
+    const Vector* a = reinterpret_cast<const Vector*>(y.Row(tile, first_output));
+    const Vector* b = reinterpret_cast<const Vector*>(x.Row(tile, first_input));
+    for (int v = 0; v < kVectors; ++v)
+      for (int o = 0; o < kOutputs; ++o)
+        for (int i = 0; i < kInputs; ++i) sum[o][i] += a[o * kVectors + v] * b[i * kVectors + v];
+  }
+  for (int o = 0; o < kOutputs; ++o) {
+    for (int i = 0; i < kInputs; ++i) {
+      T total = 0;
+      for (int lane = 0; lane < Lanes<T>::kCount; ++lane) total += sum[o][i][lane];
+      gradient[size_t(o) * x.rows() + i] += total;
+    }
+  }
+}
+
+}  // namespace
+
+template <class T>
+void Multiply(const T* weight, const T* bias, int outputs, int inputs, const T* x, T* y) {
+  MultiplyStrided(weight, inputs, 1, bias, outputs, inputs, x, y);
+}
+
+template <class T>
+void MultiplyTransposed(const T* weight, int outputs, int inputs, const T* y, T* x) {
+  MultiplyStrided<T>(weight, 1, inputs, nullptr, inputs, outputs, y, x);
+}
+
+template <class T>
+void AccumulateOuter(const Panel<T>& y, const Panel<T>& x, T* gradient, T* bias_gradient) {
+  const int outputs = y.rows();
+  const int inputs = x.rows();
+  for (int o = 0; o < outputs; o += 4) {
+    for (int i = 0; i < inputs; i += 4) {
+      T* block = gradient + size_t(o) * inputs + i;
+      if (o + 4 <= outputs && i + 4 <= inputs) {
+        AccumulateBlock<T, 4, 4>(y, o, x, i, block);
+      } else {
+        for (int oo = o; oo < std::min(o + 4, outputs); ++oo)
+          for (int ii = i; ii < std::min(i + 4, inputs); ++ii)
+            AccumulateBlock<T, 1, 1>(y, oo, x, ii, gradient + size_t(oo) * inputs + ii);
+      }
+    }
+  }
+  if (!bias_gradient) return;
+  for (int tile = 0; tile < y.tiles(); ++tile) {
+    for (int o = 0; o < outputs; ++o) {
+      T total = 0;
+      for (int s = 0; s < kTile; ++s) total += y.Row(tile, o)[s];
+      bias_gradient[o] += total;
+    }
+  }
+}
+
+#define LUMEN_INSTANTIATE(T)                                             \
+  template void Multiply<T>(const T*, const T*, int, int, const T*, T*); \
+  template void MultiplyTransposed<T>(const T*, int, int, const T*, T*); \
+  template void AccumulateOuter<T>(const Panel<T>&, const Panel<T>&, T*, T*);
+LUMEN_INSTANTIATE(float)
+LUMEN_INSTANTIATE(double)
+#undef LUMEN_INSTANTIATE
+
+}  // namespace lumen

@@ -1,0 +1,20 @@
+// The surface of a field as a closed triangle mesh.
+#pragma once
+
+#include "common/mesh.h"
+#include "recon/surface/field.h"
+
+namespace lumen {
+
+struct ExtractOptions {
+  double cell_mm = 0.75;
+};
+
+// Marching tetrahedra (six to a cube, so that the mesh is a closed manifold by construction) on a lattice
+// over the field's box; only blocks that the surface passes through are looked at. Keeps the component that
+// encloses the largest volume. Vertices in world mm (`origin` is the field's), faces oriented away from the
+// lumen. Empty where the field has no surface. Throws InputError where the field is not finite.
+Mesh ExtractMesh(const Field<float>& field, const float* parameters, const Vec3d& origin,
+                 const ExtractOptions& options);
+
+}  // namespace lumen

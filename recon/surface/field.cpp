@@ -1,0 +1,207 @@
+#include "recon/surface/field.h"
+
+#include <cmath>
+
+namespace lumen {
+namespace {
+
+MlpShape SdfShape(const FieldOptions& options) {
+  return {options.grid.levels * Grid<float>::kFeatures + 3, options.sdf_hidden, 1 + options.features,
+          Activation::kSquareplus};
+}
+
+MlpShape ColorShape(const FieldOptions& options) {
+  const int view = options.reflectance == Reflectance::kLambertian ? 0 : 6;
+  return {options.features + 3 + view, options.color_hidden, 3, Activation::kRelu};
+}
+
+// The distance network starts close to nothing, so that training starts from the initial surface; colours
+// start near the middle of their range.
+constexpr double kSdfStart = 0.02;
+constexpr double kColorStart = 0.1;
+
+}  // namespace
+
+template <class T>
+Field<T>::Field(const FieldOptions& options, const InitialSurface& initial, const Eigen::AlignedBox3d& box)
+    : options_(options),
+      initial_(initial),
+      box_(box),
+      grid_(options.grid, box),
+      sdf_(SdfShape(options)),
+      color_(ColorShape(options)),
+      unit_(static_cast<T>(options.unit_mm)) {}
+
+template <class T>
+void Field<T>::Initialise(uint64_t seed, T* parameters) const {
+  grid_.Initialise(seed * 3, parameters);
+  sdf_.Initialise(seed * 3 + 1, kSdfStart, parameters + grid_size());
+  color_.Initialise(seed * 3 + 2, kColorStart, parameters + grid_size() + sdf_.parameter_count());
+}
+
+template <class T>
+void Field<T>::FillInput(const T* parameters, const Panel<T>& positions, Panel<T>* jacobian,
+                         Panel<T>* input) const {
+  const int encoded = grid_.outputs();
+  input->Resize(encoded + 3, positions.tiles());
+  if (jacobian) {
+    jacobian->Resize(3 * encoded, positions.tiles());
+    grid_.EncodeWithJacobian(parameters, positions, input, jacobian);
+  } else {
+    grid_.Encode(parameters, positions, input);
+  }
+  for (int tile = 0; tile < positions.tiles(); ++tile) {
+    const T* x = positions.Tile(tile);
+    T* out = input->Row(tile, encoded);
+    for (int i = 0; i < 3 * kTile; ++i) out[i] = x[i] / unit_;
+  }
+}
+
+template <class T>
+void Field<T>::CutOff(const Panel<T>& positions, Panel<T>* value, Panel<T>* gradient, Panel<T>* free) const {
+  for (int tile = 0; tile < positions.tiles(); ++tile) {
+    T* f = value->Row(tile, 0);
+    T* own = free ? free->Row(tile, 0) : nullptr;
+    if (own) std::fill(own, own + kTile, T(1));
+    for (int d = 0; d < 3; ++d) {
+      const T low = static_cast<T>(box_.min()[d]), high = static_cast<T>(box_.max()[d]);
+      const T* x = positions.Row(tile, d);
+      for (int s = 0; s < kTile; ++s) {
+        const T to_low = x[s] - low, to_high = high - x[s];
+        const T bound = to_low < to_high ? to_low : to_high;
+        if (bound >= f[s]) continue;
+        f[s] = bound;
+        if (own) own[s] = 0;
+        if (!gradient) continue;
+        for (int e = 0; e < 3; ++e) gradient->Row(tile, e)[s] = 0;
+        gradient->Row(tile, d)[s] = to_low < to_high ? T(1) : T(-1);
+      }
+    }
+  }
+}
+
+template <class T>
+void Field<T>::Value(const T* parameters, ValuePass* pass) const {
+  const int tiles = pass->positions.tiles();
+  FillInput(parameters, pass->positions, nullptr, &pass->input);
+  sdf_.Forward(parameters + grid_size(), pass->input, 1, Mlp<T>::Keep::kNothing, &pass->sdf);
+  pass->value.Resize(1, tiles);
+  for (int tile = 0; tile < tiles; ++tile) {
+    T* f = pass->value.Row(tile, 0);
+    initial_.Evaluate<T>(pass->positions.Tile(tile), f, nullptr);
+    const T* out = pass->sdf.value.back().Row(tile, 0);
+    for (int s = 0; s < kTile; ++s) f[s] += unit_ * out[s];
+  }
+  CutOff(pass->positions, &pass->value, nullptr, nullptr);
+}
+
+template <class T>
+void Field<T>::Surface(const T* parameters, SurfacePass* pass) const {
+  const int tiles = pass->positions.tiles();
+  const int encoded = grid_.outputs();
+  FillInput(parameters, pass->positions, &pass->jacobian, &pass->input);
+  sdf_.Forward(parameters + grid_size(), pass->input, 1 + options_.features, Mlp<T>::Keep::kBends,
+               &pass->sdf);
+  sdf_.InputGradient(parameters + grid_size(), &pass->sdf);
+  pass->value.Resize(1, tiles);
+  pass->gradient.Resize(3, tiles);
+  pass->free.Resize(1, tiles);
+  for (int tile = 0; tile < tiles; ++tile) {
+    T* f = pass->value.Row(tile, 0);
+    initial_.Evaluate<T>(pass->positions.Tile(tile), f, pass->gradient.Tile(tile));
+    const T* out = pass->sdf.value.back().Row(tile, 0);
+    for (int s = 0; s < kTile; ++s) f[s] += unit_ * out[s];
+    for (int d = 0; d < 3; ++d) {
+      T* g = pass->gradient.Row(tile, d);
+      const T* by_place = pass->sdf.input_gradient.Row(tile, encoded + d);
+      for (int s = 0; s < kTile; ++s) g[s] += by_place[s];
+      for (int r = 0; r < encoded; ++r) {
+        const T* q = pass->sdf.input_gradient.Row(tile, r);
+        const T* slope = pass->jacobian.Row(tile, d * encoded + r);
+        for (int s = 0; s < kTile; ++s) g[s] += unit_ * q[s] * slope[s];
+      }
+    }
+  }
+  CutOff(pass->positions, &pass->value, &pass->gradient, &pass->free);
+}
+
+template <class T>
+void Field<T>::Color(const T* parameters, SurfacePass* pass) const {
+  const int tiles = pass->positions.tiles();
+  const int features = options_.features;
+  pass->color_input.Resize(color_.shape().inputs, tiles);
+  for (int tile = 0; tile < tiles; ++tile) {
+    T* in = pass->color_input.Tile(tile);
+    const T* feature = pass->sdf.value.back().Row(tile, 1);
+    std::copy(feature, feature + features * kTile, in);
+    const T* place = pass->input.Row(tile, grid_.outputs());
+    std::copy(place, place + 3 * kTile, in + features * kTile);
+    if (!sees_view()) continue;
+    const T* normal = pass->normal.Tile(tile);
+    std::copy(normal, normal + 3 * kTile, in + (features + 3) * kTile);
+    const T* direction = pass->directions.Tile(tile);
+    std::copy(direction, direction + 3 * kTile, in + (features + 6) * kTile);
+  }
+  color_.Forward(parameters + grid_size() + sdf_.parameter_count(), pass->color_input, 3,
+                 Mlp<T>::Keep::kSlopes, &pass->color);
+}
+
+template <class T>
+void Field<T>::ColorBackward(const T* parameters, SurfacePass* pass, T* network_gradient) const {
+  color_.Backward(parameters + grid_size() + sdf_.parameter_count(), pass->color_input, pass->color_delta,
+                  &pass->color, network_gradient + sdf_.parameter_count(), &pass->color_input_delta);
+  pass->normal_delta.Resize(3, pass->positions.tiles());
+  if (!sees_view()) return pass->normal_delta.SetZero();
+  for (int tile = 0; tile < pass->positions.tiles(); ++tile) {
+    const T* delta = pass->color_input_delta.Row(tile, options_.features + 3);
+    std::copy(delta, delta + 3 * kTile, pass->normal_delta.Tile(tile));
+  }
+}
+
+template <class T>
+void Field<T>::SurfaceBackward(const T* parameters, SurfacePass* pass, T* network_gradient) const {
+  const int tiles = pass->positions.tiles();
+  const int encoded = grid_.outputs();
+  const int features = options_.features;
+  pass->output_delta.Resize(1 + features, tiles);
+  pass->direction.Resize(encoded + 3, tiles);
+  pass->scaled_direction.Resize(3, tiles);
+  for (int tile = 0; tile < tiles; ++tile) {
+    const T* own = pass->free.Row(tile, 0);
+    const T* value_delta = pass->value_delta.Row(tile, 0);
+    T* out = pass->output_delta.Row(tile, 0);
+    for (int s = 0; s < kTile; ++s) out[s] = unit_ * value_delta[s] * own[s];
+    const T* feature_delta = pass->color_input_delta.Tile(tile);
+    std::copy(feature_delta, feature_delta + features * kTile, pass->output_delta.Row(tile, 1));
+    for (int d = 0; d < 3; ++d) {
+      const T* u = pass->gradient_delta.Row(tile, d);
+      T* by_place = pass->direction.Row(tile, encoded + d);
+      T* scaled = pass->scaled_direction.Row(tile, d);
+      for (int s = 0; s < kTile; ++s) {
+        by_place[s] = u[s] * own[s];
+        scaled[s] = unit_ * by_place[s];
+      }
+    }
+    const T* u = pass->scaled_direction.Tile(tile);
+    for (int r = 0; r < encoded; ++r) {
+      const T* jx = pass->jacobian.Row(tile, r);
+      const T* jy = pass->jacobian.Row(tile, encoded + r);
+      const T* jz = pass->jacobian.Row(tile, 2 * encoded + r);
+      T* v = pass->direction.Row(tile, r);
+      for (int s = 0; s < kTile; ++s) v[s] = jx[s] * u[s] + jy[s] * u[kTile + s] + jz[s] * u[2 * kTile + s];
+    }
+  }
+  sdf_.BackwardSecondOrder(parameters + grid_size(), pass->input, pass->output_delta, pass->direction,
+                           &pass->sdf, network_gradient, &pass->input_delta);
+}
+
+template <class T>
+void Field<T>::GridBackward(int level, const SurfacePass& pass, int count, T* grid_gradient) const {
+  grid_.BackwardSecondOrder(level, pass.positions, pass.input_delta, pass.sdf.input_gradient,
+                            pass.scaled_direction, count, grid_gradient);
+}
+
+template class Field<float>;
+template class Field<double>;
+
+}  // namespace lumen

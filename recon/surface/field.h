@@ -1,0 +1,99 @@
+// The neural surface: a signed distance (positive in the lumen, negative in the wall) and what the surface
+// looks like, as functions of place. Signed distance = initial surface + unit · network(grid encoding,
+// place), cut off by the distance to the bounds, so that every ray ends.
+//
+// All positions are in mm, relative to the field's origin, in panels of 3 rows.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "recon/network/grid.h"
+#include "recon/network/mlp.h"
+#include "recon/surface/initial_surface.h"
+
+namespace lumen {
+
+// What the colour network's three outputs mean; see recon/surface/shading.h.
+enum class Reflectance {
+  kLambertian,  // log albedo of a wall whose shading is known: albedo/π · irradiance · cos
+  kFree,        // log of BRDF · cos, a function of place, direction and normal: the paper's network
+  kUnlit,       // the pixel's own value, no light modelled: NeuS
+};
+
+struct FieldOptions {
+  GridOptions grid;
+  InitialSurfaceOptions initial;
+  std::vector<int> sdf_hidden = {32};
+  std::vector<int> color_hidden = {32, 32};
+  int features = 15;  // numbers that the distance network hands to the colour network
+  double unit_mm = 68;
+  Reflectance reflectance = Reflectance::kLambertian;
+};
+
+template <class T>
+class Field {
+ public:
+  // box: where the surface may lie, relative to the origin.
+  Field(const FieldOptions& options, const InitialSurface& initial, const Eigen::AlignedBox3d& box);
+
+  // Parameters: the grid's tables first, then the networks'.
+  size_t grid_size() const { return grid_.parameter_count(); }
+  size_t network_size() const { return sdf_.parameter_count() + color_.parameter_count(); }
+  size_t parameter_count() const { return grid_size() + network_size(); }
+  const Grid<T>& grid() const { return grid_; }
+  const Eigen::AlignedBox3d& box() const { return box_; }
+  const FieldOptions& options() const { return options_; }
+  void Initialise(uint64_t seed, T* parameters) const;
+
+  // Signed distances alone, of all tiles of positions.
+  struct ValuePass {
+    Panel<T> positions;  // in
+    Panel<T> value;      // out: 1 row, mm
+    Panel<T> input;      // between the passes
+    typename Mlp<T>::Pass sdf;
+  };
+  void Value(const T* parameters, ValuePass* pass) const;
+
+  // Signed distances, their gradient by place, and colour.
+  struct SurfacePass {
+    Panel<T> positions;       // in
+    Panel<T> directions;      // in, 3 rows, of the rays; read by networks that see direction
+    Panel<T> value;           // out: 1 row, mm
+    Panel<T> gradient;        // out: 3 rows, ∂value/∂x, dimensionless
+    Panel<T> free;            // out: 1 row, 1 = the network's own, 0 = cut off by the bounds: learns nothing
+    Panel<T> value_delta;     // in, for the backward pass
+    Panel<T> gradient_delta;  // in: ∂loss/∂gradient, 3 rows
+    Panel<T> normal;          // in, before Color: unit normals, 3 rows
+    Panel<T> color_delta;     // in: ∂loss/∂colour network's outputs, 3 rows
+    Panel<T> normal_delta;    // out of ColorBackward, 3 rows: 0 for networks that don't see the normal
+    // Between the passes:
+    Panel<T> input, jacobian, output_delta, direction, scaled_direction, input_delta, color_input,
+        color_input_delta;
+    typename Mlp<T>::Pass sdf, color;
+    const Panel<T>& color_output() const { return color.value.back(); }
+  };
+  void Surface(const T* parameters, SurfacePass* pass) const;
+  void Color(const T* parameters, SurfacePass* pass) const;
+  // In this order: ColorBackward, then SurfaceBackward.
+  void ColorBackward(const T* parameters, SurfacePass* pass, T* network_gradient) const;
+  void SurfaceBackward(const T* parameters, SurfacePass* pass, T* network_gradient) const;
+
+  // What the backward pass leaves for one level of the grid, from the first `count` samples.
+  void GridBackward(int level, const SurfacePass& pass, int count, T* grid_gradient) const;
+
+ private:
+  bool sees_view() const { return options_.reflectance != Reflectance::kLambertian; }
+  void FillInput(const T* parameters, const Panel<T>& positions, Panel<T>* jacobian, Panel<T>* input) const;
+  void CutOff(const Panel<T>& positions, Panel<T>* value, Panel<T>* gradient, Panel<T>* free) const;
+
+  FieldOptions options_;
+  InitialSurface initial_;
+  Eigen::AlignedBox3d box_;
+  Grid<T> grid_;
+  Mlp<T> sdf_;
+  Mlp<T> color_;
+  T unit_;
+};
+
+}  // namespace lumen

@@ -1,0 +1,41 @@
+// What the colour network's outputs send to the camera under the endoscope's light. Only co-located light is
+// seen from where it comes from; every source's own place, direction and distance count here. Shadows of
+// sources off the axis and light from other surfaces are not modelled.
+#pragma once
+
+#include <vector>
+
+#include "common/light.h"
+#include "common/math.h"
+#include "recon/surface/field.h"
+
+namespace lumen {
+
+// The sources at one frame, in the field's axes (mm, relative to its origin).
+template <class T>
+struct FrameLight {
+  struct Source {
+    Vec3<T> position, direction;
+    T spread;
+    Vec3<T> intensity;
+  };
+  std::vector<Source> sources;
+};
+template <class T>
+FrameLight<T> LightOfFrame(const Light& light, const Pose& world_from_camera, const Vec3d& origin);
+
+// Radiance (RGB) of one sample and its derivatives.
+template <class T>
+struct Shading {
+  Vec3<T> radiance;
+  Vec3<T> by_output;  // ∂radiance_c/∂output_c; the others are 0
+  Mat3<T> by_normal;  // row c: ∂radiance_c/∂normal
+};
+
+// kLambertian: exp(output)/π · Σ intensity · irradiance · max(0, n·l); kFree: exp(output) · Σ intensity ·
+// irradiance; kUnlit: 1/(1 + e^−output). normal: unit, into the lumen.
+template <class T>
+Shading<T> Shade(Reflectance reflectance, const Vec3<T>& output, const Vec3<T>& normal,
+                 const FrameLight<T>& light, const Vec3<T>& point);
+
+}  // namespace lumen

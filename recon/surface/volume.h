@@ -1,0 +1,37 @@
+// NeuS's opacity along a ray (Wang et al. 2021, eq. 13) in logarithms: between two samples with signed
+// distances f₀, f₁ and sharpness s, ℓ = min(0, logΦ(s·f₁) − logΦ(s·f₀)), α = −expm1(ℓ). No epsilon, no
+// division by 1 − α.
+#pragma once
+
+#include <cmath>
+
+namespace lumen {
+
+// log(1/(1 + e^−x)) without overflow or cancellation.
+template <class T>
+T LogSigmoid(T x) {
+  return x >= 0 ? -std::log1p(std::exp(-x)) : x - std::log1p(std::exp(x));
+}
+
+// 1/(1 + e^−x).
+template <class T>
+T Sigmoid(T x) {
+  if (x >= 0) return 1 / (1 + std::exp(-x));
+  const T e = std::exp(x);
+  return e / (1 + e);
+}
+
+// Weights of the n samples of a ray: a section's opacity times the transmittance before it, half to each of
+// its ends (the trapezoidal rule). What passes the last sample is the last one's: the wall is opaque, and a
+// ray whose weights fell short of 1 would be dark in a way that only a nearer wall can mend, a force on every
+// surface and always the same way. transmittance: n numbers, from 1 at the first sample to what passes the
+// last.
+template <class T>
+void RayWeights(int n, const T* signed_distance, T sharpness, T* transmittance, T* weight);
+
+// The gradient: distance_delta[i] = ∂loss/∂signed_distance[i], given weight_delta[i] = ∂loss/∂weight[i].
+template <class T>
+void RayWeightsBackward(int n, const T* signed_distance, T sharpness, const T* transmittance,
+                        const T* weight_delta, T* distance_delta);
+
+}  // namespace lumen

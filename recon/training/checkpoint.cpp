@@ -1,0 +1,125 @@
+#include "recon/training/checkpoint.h"
+
+#include <cstring>
+
+#include "common/error.h"
+#include "common/files.h"
+
+namespace lumen {
+namespace {
+
+constexpr char kMagic[8] = {'l', 'u', 'm', 'e', 'n', 'c', 'k', '2'};
+
+// FNV-1a, 64 bits (Fowler, Noll, Vo).
+uint64_t Checksum(std::string_view bytes) {
+  uint64_t hash = 0xcbf29ce484222325ull;
+  for (unsigned char byte : bytes) hash = (hash ^ byte) * 0x100000001b3ull;
+  return hash;
+}
+
+class Writer {
+ public:
+  template <class T>
+  void Value(const T& value) {
+    bytes.append(reinterpret_cast<const char*>(&value), sizeof(T));
+  }
+  template <class Vector>
+  void Array(const Vector& values) {
+    Value(static_cast<uint64_t>(values.size()));
+    bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(values[0]));
+  }
+  std::string bytes;
+};
+
+class Reader {
+ public:
+  Reader(std::string_view bytes, std::string name) : bytes_(bytes), name_(std::move(name)) {}
+  template <class T>
+  void Value(T* value) {
+    Copy(value, sizeof(T));
+  }
+  template <class Vector>
+  void Array(Vector* values) {
+    uint64_t size;
+    Value(&size);
+    if (size != values->size()) {
+      throw InputError(name_ + ": the checkpoint is of another sequence; train into another folder");
+    }
+    Copy(values->data(), values->size() * sizeof((*values)[0]));
+  }
+  std::string Text() {
+    uint64_t size;
+    Value(&size);
+    if (size > bytes_.size())
+      throw InputError(name_ + ": the checkpoint is cut short; remove it to start afresh");
+    std::string text(size, '\0');
+    Copy(text.data(), size);
+    return text;
+  }
+
+ private:
+  void Copy(void* to, size_t size) {
+    if (size > bytes_.size())
+      throw InputError(name_ + ": the checkpoint is cut short; remove it to start afresh");
+    std::memcpy(to, bytes_.data(), size);
+    bytes_.remove_prefix(size);
+  }
+  std::string_view bytes_;
+  std::string name_;
+};
+
+// One list for both directions, so that they can't differ.
+template <class Archive, class State>
+void Fields(Archive&& value, State& state) {
+  value(state.iteration);
+  value(state.seconds);
+  value(state.skipped_steps);
+  value(state.first_skipped_step);
+}
+template <class Archive, class State>
+void Arrays(Archive&& array, State& state) {
+  array(state.parameters);
+  array(state.first);
+  array(state.second);
+  array(state.log_gain);
+  array(state.log_gain_first);
+  array(state.log_gain_second);
+}
+
+}  // namespace
+
+void WriteCheckpoint(const std::filesystem::path& file, const std::string& settings,
+                     const TrainState& state) {
+  Writer writer;
+  writer.bytes.append(kMagic, sizeof(kMagic));
+  writer.Array(settings);
+  Fields([&](const auto& value) { writer.Value(value); }, state);
+  Arrays([&](const auto& values) { writer.Array(values); }, state);
+  writer.Value(Checksum(writer.bytes));
+  WriteFile(file, writer.bytes);
+}
+
+void ReadCheckpoint(const std::filesystem::path& file, const std::string& settings, TrainState* state) {
+  const std::string bytes = ReadFile(file);
+  const std::string name = file.string();
+  if (bytes.size() < sizeof(kMagic) + sizeof(uint64_t) ||
+      std::memcmp(bytes.data(), kMagic, sizeof(kMagic)) != 0) {
+    throw InputError(name + ": not a checkpoint of this version, or cut short; remove it to start afresh");
+  }
+  const std::string_view content(bytes.data(), bytes.size() - sizeof(uint64_t));
+  uint64_t checksum;
+  std::memcpy(&checksum, bytes.data() + content.size(), sizeof(checksum));
+  if (checksum != Checksum(content)) {
+    throw InputError(name + ": the checkpoint is damaged (its checksum is wrong); remove it to start afresh");
+  }
+  Reader reader(content.substr(sizeof(kMagic)), name);
+  if (reader.Text() != settings) {
+    throw InputError(name +
+                     ": the checkpoint was made with other settings; train into another folder, or with the "
+                     "settings in config.toml beside it");
+  }
+  Fields([&](auto& value) { reader.Value(&value); }, *state);
+  Arrays([&](auto& values) { reader.Array(&values); }, *state);
+}
+
+}  // namespace lumen

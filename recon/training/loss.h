@@ -1,0 +1,58 @@
+// The terms of the loss at one pixel or one sample, each with its derivative.
+#pragma once
+
+#include <cmath>
+#include <cstdint>
+
+#include "common/math.h"
+
+namespace lumen {
+
+// A number and its derivative by the argument in question.
+template <class T>
+struct Term {
+  T value;
+  T slope;
+};
+
+// x^(1/γ) for x ≥ 0, continued below `floor` by its tangent there: the derivative is bounded by
+// floor^(1/γ − 1)/γ, and no x, 0 included, is without a finite one. With floor the radiance of half an 8-bit
+// step, (1/510)^γ, the continuation differs from the power by less than the step in which both are black.
+template <class T>
+Term<T> Compress(T x, T inverse_gamma, T floor) {
+  const T base = x > floor ? x : floor;
+  const T power = std::pow(base, inverse_gamma);
+  const T slope = inverse_gamma * power / base;
+  return {power + slope * (x - base), slope};
+}
+
+// What a pixel says of its radiance: saturated and black ones bound it from one side only.
+enum class PixelBound : uint8_t { kExact, kAtLeast, kAtMost };
+
+// |predicted − observed|, and 0 where the bound is kept.
+template <class T>
+Term<T> PhotometricLoss(T predicted, T observed, PixelBound bound) {
+  const T error = predicted - observed;
+  if (bound == PixelBound::kAtLeast && error > 0) return {0, 0};
+  if (bound == PixelBound::kAtMost && error < 0) return {0, 0};
+  return {std::abs(error), error > 0 ? T(1) : error < 0 ? T(-1) : T(0)};
+}
+
+// (|g| − 1)² and its gradient by g; 0 at g = 0, which no direction leads away from.
+template <class T>
+T EikonalLoss(const Vec3<T>& gradient, Vec3<T>* slope) {
+  const T length = gradient.norm();
+  const T excess = length - 1;
+  *slope = length > 0 ? Vec3<T>(gradient * (2 * excess / length)) : Vec3<T>::Zero();
+  return excess * excess;
+}
+
+// Huber's: quadratic within ±width, linear beyond.
+template <class T>
+Term<T> HuberLoss(T x, T width) {
+  const T size = std::abs(x);
+  if (size <= width) return {x * x / (2 * width), x / width};
+  return {size - width / 2, x > 0 ? T(1) : T(-1)};
+}
+
+}  // namespace lumen

@@ -1,0 +1,122 @@
+#include "recon/training/march.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/random.h"
+
+namespace lumen {
+namespace {
+
+constexpr int kSecantSteps = 3;
+
+// The steepness, as |df/dt|, that spacing counts with: at grazing incidence the density's layer is longer
+// along the ray than its width, but by no more than five times is it followed.
+constexpr float kShallowest = 0.2f;
+
+// Distance at which a ray leaves the box.
+float ExitDistance(const Eigen::AlignedBox3d& box, const Vec3f& origin, const Vec3f& direction) {
+  float exit = std::numeric_limits<float>::max();
+  for (int d = 0; d < 3; ++d) {
+    if (direction[d] == 0) continue;
+    const double wall = direction[d] > 0 ? box.max()[d] : box.min()[d];
+    exit = std::min(exit, (static_cast<float>(wall) - origin[d]) / direction[d]);
+  }
+  return exit;
+}
+
+}  // namespace
+
+void Marcher::Look(const float* parameters, const RayBatch<float>& batch,
+                   const std::vector<float>& distance) {
+  const int count = static_cast<int>(distance.size());
+  const int rays = static_cast<int>(batch.rays.size());
+  pass_.positions.Resize(3, TilesFor(count));
+  for (int i = 0; i < TilesFor(count) * kTile; ++i) {
+    const int k = std::min(i, count - 1);
+    const auto& ray = batch.rays[k % rays];
+    for (int d = 0; d < 3; ++d) pass_.positions.At(d, i) = ray.origin[d] + distance[k] * ray.direction[d];
+  }
+  field_->Value(parameters, &pass_);
+}
+
+void Marcher::FindCrossings(const float* parameters, const TrainOptions::Sampling& options, uint64_t key,
+                            const RayBatch<float>& batch) {
+  const int rays = static_cast<int>(batch.rays.size());
+  far_.resize(rays);
+  look_.resize(size_t(rays) * options.coarse);
+  for (int r = 0; r < rays; ++r) {
+    // A little beyond the box, where the signed distance is negative for certain.
+    far_[r] = std::max(1.001f * ExitDistance(field_->box(), batch.rays[r].origin, batch.rays[r].direction),
+                       2 * kNearest_mm);
+    const float jitter = UniformFloat(RandomBits(key, r, 0));
+    for (int k = 0; k < options.coarse; ++k) {
+      // Denser near the camera, where folds are seen thin; the last look-up is at the far end itself.
+      const float u = k + 1 == options.coarse ? 1.0f : (k + jitter) / (options.coarse - 1);
+      look_[size_t(k) * rays + r] = kNearest_mm + (far_[r] - kNearest_mm) * u * std::sqrt(u);
+    }
+  }
+  Look(parameters, batch, look_);
+  crossings_.resize(rays);
+  for (int r = 0; r < rays; ++r) {
+    int k = 0;
+    while (k + 1 < options.coarse && pass_.value.At(0, k * rays + r) > 0) ++k;
+    const int before = std::max(k - 1, 0);
+    crossings_[r] = {look_[size_t(before) * rays + r], look_[size_t(k) * rays + r],
+                     pass_.value.At(0, before * rays + r), pass_.value.At(0, k * rays + r)};
+  }
+  look_.resize(rays);
+  for (int step = 0; step < kSecantSteps; ++step) {
+    for (int r = 0; r < rays; ++r) {
+      const Crossing& c = crossings_[r];
+      const float fall = c.inside_value - c.outside_value;
+      look_[r] = fall > 0 ? c.inside + (c.outside - c.inside) * (c.inside_value / fall) : c.inside;
+      look_[r] = std::clamp(look_[r], c.inside, c.outside);
+    }
+    Look(parameters, batch, look_);
+    for (int r = 0; r < rays; ++r) {
+      Crossing& c = crossings_[r];
+      const float value = pass_.value.At(0, r);
+      if (value > 0) {
+        c.inside = look_[r];
+        c.inside_value = value;
+      } else {
+        c.outside = look_[r];
+        c.outside_value = value;
+      }
+    }
+  }
+}
+
+void Marcher::Place(const float* parameters, const TrainOptions::Sampling& options, float sharpness,
+                    uint64_t key, RayBatch<float>* batch) {
+  FindCrossings(parameters, options, key, *batch);
+  const int n = options.surface + options.spread;
+  batch->samples = n;
+  batch->distance.resize(batch->rays.size() * n);
+  for (size_t r = 0; r < batch->rays.size(); ++r) {
+    const Crossing& c = crossings_[r];
+    const float fall = c.inside_value - c.outside_value, gap = c.outside - c.inside;
+    const float meets =
+        fall > 0 ? std::clamp(c.inside + gap * (c.inside_value / fall), c.inside, c.outside) : c.inside;
+    const float steepness = gap > 0 ? std::clamp(fall / gap, kShallowest, 1.0f) : 1.0f;
+    const float spacing = static_cast<float>(options.surface_spacing) / (sharpness * steepness);
+    float* distance = &batch->distance[r * n];
+    const float last = std::clamp(meets + 0.5f * options.surface * spacing, 2 * kNearest_mm, far_[r]);
+    for (int k = 0; k < options.surface; ++k) {
+      const float jitter = UniformFloat(RandomBits(key, r, 1 + k));
+      const float t = meets + spacing * (k + jitter - 0.5f * options.surface);
+      distance[k] = std::clamp(t, kNearest_mm, far_[r]);
+    }
+    for (int k = 0; k < options.spread; ++k) {
+      const float jitter = UniformFloat(RandomBits(key, r, 1 + options.surface + k));
+      distance[options.surface + k] = kNearest_mm + (last - kNearest_mm) * (k + jitter) / options.spread;
+    }
+    const float eikonal = distance[options.surface + RandomBits(key, r, 1 + n) % options.spread];
+    std::sort(distance, distance + n);
+    batch->rays[r].eikonal_sample =
+        static_cast<int>(std::lower_bound(distance, distance + n, eikonal) - distance);
+  }
+}
+
+}  // namespace lumen

@@ -1,0 +1,61 @@
+// Everything that a training run can be told, and the presets: named sets of these values.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "recon/surface/field.h"
+
+namespace lumen {
+
+struct TrainOptions {
+  std::string preset;
+  int frames = 20;  // taken uniformly over the sequence
+  FieldOptions field;
+
+  struct Bounds {
+    double ahead_mm = 100;  // how far from a camera the wall may lie where it looks
+    double aside_mm = 40;   // and in every other direction
+  } bounds;
+
+  struct Sampling {
+    int rays = 256;              // a step
+    int coarse = 16;             // look-ups that find where a ray meets the surface
+    int surface = 8;             // samples placed around that
+    int spread = 9;              // samples spread in front of it
+    double surface_spacing = 1;  // of those around it, in units of 1/s
+    double weight_threshold = 1e-3;
+  } sampling;
+
+  struct Loss {
+    double eikonal = 0.1;
+    double albedo = 2;           // pull of the log albedo to its mean over neighbouring rays, at the start
+    double albedo_final = 0.02;  // the part of it that is left at the end
+    double albedo_width = 0.3;   // of its Huber loss
+  } loss;
+
+  struct Schedule {
+    int64_t iterations = 6000;
+    double seconds = 0;  // > 0: the run is as long as that instead
+    double learning_rate = 1e-2;
+    double learning_rate_final = 0.05;  // the part of it that is left at the end
+    double sharpness_start_per_mm = 0.6;
+    double sharpness_end_per_mm = 4.4;
+    double checkpoint_seconds = 10;  // between checkpoints
+  } schedule;
+
+  double extract_cell_mm = 0.75;
+};
+
+// Names of the presets: "fast" (ours) and "neus" (the same without the decline: the baseline).
+std::vector<std::string> PresetNames();
+
+// A preset with the command line's settings ("loss.eikonal=0.05") on top. Throws InputError: no such preset,
+// unknown key, value out of range.
+TrainOptions ReadTrainOptions(const std::string& preset, const std::vector<std::string>& settings);
+
+// All of it as TOML, as RUN/config.toml shows it.
+std::string FormatTrainOptions(const TrainOptions& options);
+
+}  // namespace lumen

@@ -1,0 +1,237 @@
+#include "recon/training/ray_loss.h"
+
+#include "recon/surface/volume.h"
+
+namespace lumen {
+namespace {
+
+// Below this length the SDF's gradient has no direction worth shading by: the normal's derivative, which
+// grows as 1/length, is left out until the eikonal term has mended the length. Twenty times is as far as one
+// sample may outweigh another.
+constexpr double kShortestGradient = 0.05;
+
+}  // namespace
+
+LossTerms& LossTerms::operator+=(const LossTerms& other) {
+  photometric += other.photometric;
+  eikonal += other.eikonal;
+  albedo += other.albedo;
+  active_samples += other.active_samples;
+  return *this;
+}
+
+template <class T>
+void RayLoss<T>::FindWeights(const T* parameters, const RayBatch<T>& batch, const LossSettings<T>& settings) {
+  const int n = batch.samples;
+  const int count = static_cast<int>(batch.rays.size()) * n;
+  value_.positions.Resize(3, TilesFor(count));
+  for (int i = 0; i < TilesFor(count) * kTile; ++i) {
+    const int k = std::min(i, count - 1);  // the last tile is filled up with copies of the last sample
+    const auto& ray = batch.rays[k / n];
+    for (int d = 0; d < 3; ++d)
+      value_.positions.At(d, i) = ray.origin[d] + batch.distance[k] * ray.direction[d];
+  }
+  field_->Value(parameters, &value_);
+  signed_distance_.resize(count);
+  transmittance_.resize(count);
+  weight_.resize(count);
+  for (int i = 0; i < count; ++i) signed_distance_[i] = value_.value.At(0, i);
+  for (size_t r = 0; r < batch.rays.size(); ++r) {
+    RayWeights(n, &signed_distance_[r * n], settings.sharpness, &transmittance_[r * n], &weight_[r * n]);
+  }
+}
+
+template <class T>
+void RayLoss<T>::SelectActive(const RayBatch<T>& batch, const LossSettings<T>& settings) {
+  active_.clear();
+  const int n = batch.samples;
+  for (size_t r = 0; r < batch.rays.size(); ++r) {
+    for (int k = 0; k < n; ++k) {
+      const size_t i = r * n + k;
+      // A sample's own weight, and the light that a change of its distance could still take away.
+      const T influence = transmittance_[i] * Sigmoid(-settings.sharpness * signed_distance_[i]);
+      const bool seen = weight_[i] > settings.weight_threshold || influence > settings.weight_threshold;
+      if (!seen && k != batch.rays[r].eikonal_sample) continue;
+      active_.push_back({static_cast<int>(r), k, seen ? weight_[i] : T(0), T(0)});
+    }
+  }
+}
+
+template <class T>
+void RayLoss<T>::ShadeActive(const T* parameters, const RayBatch<T>& batch,
+                             const std::vector<FrameLight<T>>& lights) {
+  const int count = static_cast<int>(active_.size());
+  const int tiles = TilesFor(count);
+  surface_.positions.Resize(3, tiles);
+  surface_.directions.Resize(3, tiles);
+  surface_.normal.Resize(3, tiles);
+  for (int i = 0; i < tiles * kTile; ++i) {
+    const Active& sample = active_[std::min(i, count - 1)];
+    const auto& ray = batch.rays[sample.ray];
+    const T t = batch.distance[size_t(sample.ray) * batch.samples + sample.sample];
+    for (int d = 0; d < 3; ++d) {
+      surface_.positions.At(d, i) = ray.origin[d] + t * ray.direction[d];
+      surface_.directions.At(d, i) = ray.direction[d];
+    }
+  }
+  field_->Surface(parameters, &surface_);
+  for (int i = 0; i < tiles * kTile; ++i) {
+    Vec3<T> gradient(surface_.gradient.At(0, i), surface_.gradient.At(1, i), surface_.gradient.At(2, i));
+    const T length = gradient.norm();
+    if (i < count) active_[i].length = length;
+    if (length > 0) gradient /= length;
+    for (int d = 0; d < 3; ++d) surface_.normal.At(d, i) = gradient[d];
+  }
+  field_->Color(parameters, &surface_);
+  const Panel<T>& output = surface_.color_output();
+  shading_.resize(count);
+  for (int i = 0; i < count; ++i) {
+    const Active& sample = active_[i];
+    if (!(sample.weight > 0)) continue;
+    const Vec3<T> point(surface_.positions.At(0, i), surface_.positions.At(1, i),
+                        surface_.positions.At(2, i));
+    const Vec3<T> normal(surface_.normal.At(0, i), surface_.normal.At(1, i), surface_.normal.At(2, i));
+    shading_[i] =
+        Shade(field_->options().reflectance, Vec3<T>(output.At(0, i), output.At(1, i), output.At(2, i)),
+              normal, lights[batch.rays[sample.ray].frame], point);
+  }
+}
+
+template <class T>
+double RayLoss<T>::ComparePixels(const RayBatch<T>& batch, const std::vector<T>& log_gain,
+                                 const LossSettings<T>& settings, T* log_gain_gradient) {
+  const bool lit = field_->options().reflectance != Reflectance::kUnlit;
+  radiance_delta_.assign(batch.rays.size(), Vec3<T>::Zero());
+  for (size_t i = 0; i < active_.size(); ++i) {
+    if (active_[i].weight > 0) radiance_delta_[active_[i].ray] += active_[i].weight * shading_[i].radiance;
+  }
+  double loss = 0;
+  const T share = settings.per_ray / 3;
+  for (size_t r = 0; r < batch.rays.size(); ++r) {
+    const auto& ray = batch.rays[r];
+    const T exposure = ray.exposure * std::exp(log_gain[ray.frame]);
+    for (int c = 0; c < 3; ++c) {
+      const T linear = exposure * radiance_delta_[r][c];  // so far it holds the radiance itself
+      const Term<T> pixel = lit ? Compress(linear, settings.inverse_gamma, ray.floor) : Term<T>{linear, T(1)};
+      const Term<T> error = PhotometricLoss(pixel.value, ray.observed[c], ray.bound[c]);
+      loss += share * error.value;
+      const T delta = share * error.slope * pixel.slope;  // ∂loss/∂linear
+      log_gain_gradient[ray.frame] += delta * linear;
+      radiance_delta_[r][c] = delta * exposure;
+    }
+  }
+  return loss;
+}
+
+template <class T>
+void RayLoss<T>::BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& settings, LossTerms* terms) {
+  const int tiles = surface_.positions.tiles();
+  const int n = batch.samples;
+  surface_.value_delta.Resize(1, tiles);
+  surface_.gradient_delta.Resize(3, tiles);
+  surface_.color_delta.Resize(3, tiles);
+  surface_.value_delta.SetZero();
+  surface_.gradient_delta.SetZero();
+  surface_.color_delta.SetZero();
+  weight_delta_.assign(weight_.size(), T(0));
+  distance_delta_.resize(weight_.size());
+  for (size_t i = 0; i < active_.size(); ++i) {
+    const Active& sample = active_[i];
+    if (!(sample.weight > 0)) continue;
+    const Vec3<T>& delta = radiance_delta_[sample.ray];
+    weight_delta_[size_t(sample.ray) * n + sample.sample] = delta.dot(shading_[i].radiance);
+    for (int c = 0; c < 3; ++c) {
+      surface_.color_delta.At(c, i) = delta[c] * sample.weight * shading_[i].by_output[c];
+    }
+  }
+  if (settings.albedo_weight > 0) terms->albedo = PullAlbedo(settings);
+  for (size_t r = 0; r < batch.rays.size(); ++r) {
+    RayWeightsBackward(n, &signed_distance_[r * n], settings.sharpness, &transmittance_[r * n],
+                       &weight_delta_[r * n], &distance_delta_[r * n]);
+  }
+  for (size_t i = 0; i < active_.size(); ++i) {
+    surface_.value_delta.At(0, i) = distance_delta_[size_t(active_[i].ray) * n + active_[i].sample];
+  }
+}
+
+// Pulls the samples' log albedo towards its mean over the batch. The mean is the batch's own and moves with
+// it, so the pull is on the spread alone and never on the level: a pull to a fixed mean would hold the whole
+// reconstruction at the scale at which it starts. It acts on the albedo alone: a weight that depended on it
+// would move the surface to where the albedo is mean.
+template <class T>
+double RayLoss<T>::PullAlbedo(const LossSettings<T>& settings) {
+  double loss = 0;
+  const T share = settings.albedo_weight * settings.per_ray / 3;
+  pull_.resize(active_.size());
+  for (int c = 0; c < 3; ++c) {
+    T weight = 0, mean = 0, mean_slope = 0;
+    for (size_t i = 0; i < active_.size(); ++i) {
+      weight += active_[i].weight;
+      mean += active_[i].weight * surface_.color_output().At(c, i);
+    }
+    if (!(weight > 0)) return 0;
+    mean /= weight;
+    for (size_t i = 0; i < active_.size(); ++i) {
+      pull_[i] = HuberLoss(surface_.color_output().At(c, i) - mean, settings.albedo_width);
+      loss += share * active_[i].weight * pull_[i].value;
+      mean_slope += active_[i].weight * pull_[i].slope / weight;
+    }
+    for (size_t i = 0; i < active_.size(); ++i) {
+      surface_.color_delta.At(c, i) += share * active_[i].weight * (pull_[i].slope - mean_slope);
+    }
+  }
+  return loss;
+}
+
+template <class T>
+LossTerms RayLoss<T>::Evaluate(const T* parameters, const RayBatch<T>& batch,
+                               const std::vector<FrameLight<T>>& lights, const std::vector<T>& log_gain,
+                               const LossSettings<T>& settings, T* network_gradient, T* log_gain_gradient) {
+  LossTerms terms;
+  FindWeights(parameters, batch, settings);
+  SelectActive(batch, settings);
+  terms.active_samples = static_cast<int64_t>(active_.size());
+  ShadeActive(parameters, batch, lights);
+  terms.photometric = ComparePixels(batch, log_gain, settings, log_gain_gradient);
+  BackToSamples(batch, settings, &terms);
+  field_->ColorBackward(parameters, &surface_, network_gradient);
+
+  const T eikonal_share = settings.eikonal_weight * settings.per_ray / T(batch.samples);
+  for (size_t i = 0; i < active_.size(); ++i) {
+    const Active& sample = active_[i];
+    const Vec3<T> gradient(surface_.gradient.At(0, i), surface_.gradient.At(1, i),
+                           surface_.gradient.At(2, i));
+    Vec3<T> slope;
+    terms.eikonal += eikonal_share * EikonalLoss(gradient, &slope);
+    Vec3<T> delta = eikonal_share * slope;
+    if (sample.weight > 0 && sample.length > T(kShortestGradient)) {
+      const Vec3<T> normal = gradient / sample.length;
+      Vec3<T> by_normal(surface_.normal_delta.At(0, i), surface_.normal_delta.At(1, i),
+                        surface_.normal_delta.At(2, i));
+      by_normal += sample.weight * shading_[i].by_normal.transpose() * radiance_delta_[sample.ray];
+      delta += (by_normal - normal * normal.dot(by_normal)) / sample.length;
+    }
+    for (int d = 0; d < 3; ++d) surface_.gradient_delta.At(d, i) = delta[d];
+  }
+  field_->SurfaceBackward(parameters, &surface_, network_gradient);
+  return terms;
+}
+
+template <class T>
+bool RayLoss<T>::GridGradientIsFinite() const {
+  // A sum is not finite if any of its terms isn't; a sum a lane, so that it takes no time.
+  T sum[kTile] = {};
+  for (const Panel<T>* panel :
+       {&surface_.input_delta, &surface_.scaled_direction, &surface_.sdf.input_gradient}) {
+    for (int row = 0; row < panel->tiles() * panel->rows(); ++row)
+      for (int s = 0; s < kTile; ++s) sum[s] += panel->Tile(0)[row * kTile + s];
+  }
+  T total = 0;
+  for (T lane : sum) total += lane;
+  return std::isfinite(total);
+}
+
+template class RayLoss<float>;
+template class RayLoss<double>;
+
+}  // namespace lumen

@@ -1,0 +1,98 @@
+// From rays and the places of their samples to the loss and its gradient: signed distances, opacities,
+// shading, compositing, comparison with the pixels, and all the way back. The places are given
+// (recon/training/march.h), so that the loss is a smooth function of the parameters, which is what its
+// gradient is checked against.
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "recon/surface/field.h"
+#include "recon/surface/shading.h"
+#include "recon/training/loss.h"
+
+namespace lumen {
+
+// Some rays with what their pixels show.
+template <class T>
+struct RayBatch {
+  struct Ray {
+    Vec3<T> origin, direction;  // mm, relative to the field's origin; unit
+    int frame;                  // index into the lights and gains
+    // Predicted radiance × exposure is comparable with the observed one: gain · vignetting over the pixel's
+    // own normalisation (L_e g of the paper).
+    T exposure;
+    T floor;           // of Compress, in the same normalised units
+    Vec3<T> observed;  // normalised and compressed: the paper's I′
+    std::array<PixelBound, 3> bound;
+    int eikonal_sample;  // one sample a ray that the eikonal term sees wherever it lies
+  };
+  std::vector<Ray> rays;
+  int samples = 0;          // a ray
+  std::vector<T> distance;  // rays × samples, increasing, mm
+};
+
+template <class T>
+struct LossSettings {
+  T sharpness;      // s, 1/mm
+  T inverse_gamma;  // of the comparison
+  T eikonal_weight;
+  T albedo_weight;  // of the pull of the albedo to the batch's mean; kLambertian only
+  T albedo_width;   // of its Huber loss, in log
+  // Samples whose weight and whose influence on any weight are below this are left out.
+  T weight_threshold;
+  T per_ray;  // 1/number of rays of the whole step
+};
+
+// Sums over a batch; each is a part of the step's loss.
+struct LossTerms {
+  double photometric = 0;
+  double eikonal = 0;
+  double albedo = 0;
+  int64_t active_samples = 0;
+
+  LossTerms& operator+=(const LossTerms& other);
+};
+
+// Computes on one batch at a time, reusing its memory.
+template <class T>
+class RayLoss {
+ public:
+  explicit RayLoss(const Field<T>* field) : field_(field) {}
+
+  // Loss of a batch. Adds the gradient by the networks' parameters to network_gradient and by each frame's
+  // log gain to log_gain_gradient; the grid's part waits for GridBackward.
+  LossTerms Evaluate(const T* parameters, const RayBatch<T>& batch, const std::vector<FrameLight<T>>& lights,
+                     const std::vector<T>& log_gain, const LossSettings<T>& settings, T* network_gradient,
+                     T* log_gain_gradient);
+  void GridBackward(int level, T* grid_gradient) const {
+    field_->GridBackward(level, surface_, static_cast<int>(active_.size()), grid_gradient);
+  }
+  // Whether everything that GridBackward spreads over the grid is finite.
+  bool GridGradientIsFinite() const;
+
+ private:
+  struct Active {
+    int ray, sample;
+    T weight;  // of the sample in its ray; 0 if only the eikonal term sees it
+    T length;  // of the SDF's gradient
+  };
+  void FindWeights(const T* parameters, const RayBatch<T>& batch, const LossSettings<T>& settings);
+  void SelectActive(const RayBatch<T>& batch, const LossSettings<T>& settings);
+  void ShadeActive(const T* parameters, const RayBatch<T>& batch, const std::vector<FrameLight<T>>& lights);
+  double ComparePixels(const RayBatch<T>& batch, const std::vector<T>& log_gain,
+                       const LossSettings<T>& settings, T* log_gain_gradient);
+  double PullAlbedo(const LossSettings<T>& settings);
+  void BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& settings, LossTerms* terms);
+
+  const Field<T>* field_;
+  typename Field<T>::ValuePass value_;
+  typename Field<T>::SurfacePass surface_;
+  std::vector<T> signed_distance_, transmittance_, weight_, weight_delta_, distance_delta_;  // rays × samples
+  std::vector<Vec3<T>> radiance_delta_;                                                      // a ray
+  std::vector<Active> active_;
+  std::vector<Shading<T>> shading_;  // an active sample
+  std::vector<Term<T>> pull_;        // on its albedo, of one channel
+};
+
+}  // namespace lumen

@@ -1,0 +1,31 @@
+// A training run from sequence to mesh, in a folder: mesh.ply, log.jsonl, config.toml, checkpoint.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "common/sequence.h"
+#include "recon/training/options.h"
+
+namespace lumen {
+
+struct TrainRun {
+  std::filesystem::path folder;
+  uint64_t seed = 0;
+  bool resume = false;  // go on from the folder's checkpoint, if there is one
+};
+
+struct TrainResult {
+  double seconds = 0;  // of training; reading frames and extracting the mesh come on top
+  int64_t iterations = 0;
+  double rays_per_second = 0;
+  double final_loss = 0;
+  std::string stopped_by;  // "iterations" or "seconds"
+  int64_t skipped_steps = 0;
+};
+
+// Throws InputError: what the sequence or the folder is at fault for; a run without a surface at its end.
+TrainResult Train(const Sequence& sequence, const TrainOptions& options, const TrainRun& run);
+
+}  // namespace lumen

@@ -1,0 +1,117 @@
+#include "recon/training/training_frames.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/error.h"
+
+namespace lumen {
+namespace {
+
+constexpr double kHalfStep = 0.5 / 255;  // what 8 bits can't tell from black
+
+// L_e along a ray from the camera's centre: what the sources would send there from a common place, channels
+// averaged.
+double PatternAlong(const Light& light, const Vec3d& ray) {
+  double sum = 0;
+  for (const LightSource& source : light.sources) {
+    sum += source.intensity.mean() * std::exp(-source.spread * (1 - source.direction.dot(ray)));
+  }
+  return sum;
+}
+
+}  // namespace
+
+TrainingFrames::TrainingFrames(const Sequence& sequence, int count, bool lit)
+    : calibration_(sequence.calibration), lit_(lit) {
+  const CameraIntrinsics& intrinsics = calibration_.camera;
+  const Image8 valid = ValidPixels(calibration_);
+  const Camera<double> camera(intrinsics);
+  std::vector<size_t> pixels;
+  for (int y = 0; y < intrinsics.height; ++y) {
+    for (int x = 0; x < intrinsics.width; ++x) {
+      if (*valid.Pixel(x, y) == 0) continue;
+      const auto ray = camera.Unproject(Vec2d(x, y));
+      if (!ray) continue;
+      const double vignetting = Vignetting(calibration_.response, ray->z());
+      if (vignetting < kHalfStep) continue;  // black whatever is there
+      pixels.push_back(size_t(y) * intrinsics.width + x);
+      rays_.push_back(ray->cast<float>());
+      vignetting_.push_back(static_cast<float>(vignetting));
+      pattern_.push_back(static_cast<float>(PatternAlong(calibration_.light, *ray)));
+    }
+  }
+  if (pixels.empty()) throw InputError(sequence.folder.string() + ": no pixel carries image; check the mask");
+  for (int i = 0; i < 256; ++i) decoded_[i] = static_cast<float>(Decode(calibration_.response, i / 255.0));
+
+  const int available = static_cast<int>(sequence.frames.size());
+  const int taken = std::min(count, available);
+  for (int i = 0; i < taken; ++i) {
+    const int index =
+        taken > 1 ? static_cast<int>(std::lround(double(i) * (available - 1) / (taken - 1))) : 0;
+    const SequenceFrame& source = sequence.frames[index];
+    const Image8 color = ReadColor(sequence, source);
+    Frame frame;
+    frame.gain = source.gain.value_or(1.0);
+    gains_known_ = gains_known_ && source.gain.has_value();
+    frame.rgb.reserve(pixels.size() * 3);
+    for (size_t pixel : pixels) {
+      frame.rgb.insert(frame.rgb.end(), color.data.begin() + 3 * pixel, color.data.begin() + 3 * pixel + 3);
+    }
+    frames_.push_back(std::move(frame));
+    poses_.push_back(source.world_from_camera);
+  }
+  if (lit_) FindScale();
+}
+
+double TrainingFrames::inverse_gamma() const {
+  return 1 / (calibration_.response.srgb ? 2.2 : calibration_.response.gamma);
+}
+
+double TrainingFrames::Normaliser(size_t pixel) const { return double(vignetting_[pixel]) * pattern_[pixel]; }
+
+void TrainingFrames::FindScale() {
+  double sum = 0;
+  size_t count = 0;
+  for (const Frame& frame : frames_) {
+    for (size_t pixel = 0; pixel < rays_.size(); pixel += 97) {
+      for (int c = 0; c < 3; ++c, ++count) {
+        const double linear = decoded_[frame.rgb[3 * pixel + c]] / (frame.gain * Normaliser(pixel));
+        sum += std::pow(linear, inverse_gamma());
+      }
+    }
+  }
+  if (!(sum > 0))
+    throw InputError(calibration_.light.sources.empty() ? "no light source" : "all frames are black");
+  scale_ = std::pow(2 * sum / static_cast<double>(count), 1 / inverse_gamma());
+}
+
+void TrainingFrames::Draw(uint64_t draw, const Vec3d& origin, RayBatch<float>::Ray* ray) const {
+  // Two independent numbers from the upper and the lower half.
+  const size_t frame_index = ((draw >> 32) * frames_.size()) >> 32;
+  const size_t pixel = ((draw & 0xffffffffull) * rays_.size()) >> 32;
+  const Frame& frame = frames_[frame_index];
+  const Pose& pose = poses_[frame_index];
+  ray->origin = (pose.translation() - origin).cast<float>();
+  ray->direction = (pose.linear() * rays_[pixel].cast<double>()).cast<float>();
+  ray->frame = static_cast<int>(frame_index);
+  const float normaliser = static_cast<float>(frame.gain * Normaliser(pixel) * scale_);
+  ray->exposure = lit_ ? 1 / (pattern_[pixel] * static_cast<float>(scale_)) : 1.0f;
+  const float gamma = static_cast<float>(1 / inverse_gamma());
+  ray->floor = std::pow(static_cast<float>(kHalfStep), gamma) / normaliser;
+  for (int c = 0; c < 3; ++c) {
+    const uint8_t value = frame.rgb[3 * pixel + c];
+    ray->bound[c] = value == 255 ? PixelBound::kAtLeast
+                    : value == 0 ? PixelBound::kAtMost
+                                 : PixelBound::kExact;
+    const float seen = value == 0 ? static_cast<float>(kHalfStep) : value / 255.0f;
+    if (lit_) {
+      const float linear = value == 0 ? std::pow(static_cast<float>(kHalfStep), gamma) : decoded_[value];
+      ray->observed[c] = std::pow(linear / normaliser, 1 / gamma);
+    } else {
+      ray->observed[c] = seen;
+    }
+  }
+}
+
+}  // namespace lumen

@@ -1,0 +1,53 @@
+// The frames that a run trains on: their pixels, photometrically normalised as in the paper,
+// I′ = (I^γ / (L_e g))^(1/γ), and the rays that see them.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/sequence.h"
+#include "recon/training/ray_loss.h"
+
+namespace lumen {
+
+class TrainingFrames {
+ public:
+  // Reads `count` frames taken uniformly over the sequence (all, if there are fewer). `lit`: normalise;
+  // otherwise pixels stay as they are (NeuS). Throws InputError: a frame unreadable, no pixel valid, all
+  // pixels black.
+  TrainingFrames(const Sequence& sequence, int count, bool lit);
+
+  int size() const { return static_cast<int>(frames_.size()); }
+  // Poses of the frames taken.
+  const std::vector<Pose>& world_from_camera() const { return poses_; }
+  const Light& light() const { return calibration_.light; }
+  // Unit rays in camera axes of the image's valid pixels.
+  const std::vector<Vec3f>& pixel_rays() const { return rays_; }
+  bool gains_known() const { return gains_known_; }
+  // 1/γ of the comparison; for an sRGB response that of the 2.2 which approximates it.
+  double inverse_gamma() const;
+
+  // Fills the pixel's part of a ray: direction and origin relative to `origin`, frame, exposure, floor,
+  // observed value and its bounds. `draw`: 64 random bits that choose frame and pixel, uniformly.
+  void Draw(uint64_t draw, const Vec3d& origin, RayBatch<float>::Ray* ray) const;
+
+ private:
+  struct Frame {
+    std::vector<uint8_t> rgb;  // of the valid pixels, three each
+    double gain;               // 1 where unknown
+  };
+  double Normaliser(size_t pixel) const;  // vignetting · L_e
+  void FindScale();
+
+  Calibration calibration_;
+  bool lit_;
+  bool gains_known_ = true;
+  std::vector<Pose> poses_;
+  std::vector<Frame> frames_;
+  std::vector<Vec3f> rays_;
+  std::vector<float> vignetting_, pattern_;  // a valid pixel; pattern: L_e on its ray, mm²
+  double scale_ = 1;                         // 1/mm²: brings normalised pixels to a mean of one half
+  float decoded_[256];
+};
+
+}  // namespace lumen

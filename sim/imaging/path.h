@@ -1,0 +1,66 @@
+// The path tracer: light from the endoscope's guides by way of the wall to the camera, direct and from wall
+// to wall.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/camera.h"
+#include "common/image.h"
+#include "common/light.h"
+#include "common/math.h"
+#include "common/ray_scene.h"
+#include "sim/imaging/surface.h"
+
+namespace lumen {
+
+struct PathOptions {
+  int samples = 8;         // a pixel
+  int bounces = 0;         // from wall to wall; 0 = direct light only
+  int roulette_after = 2;  // bounces that every path may make before Russian roulette
+};
+
+// What there is to see. All of it is referred to.
+struct PathScene {
+  const RayScene* wall;
+  const Surface* surface;
+  uint64_t surface_seed;
+};
+
+struct View {
+  const Camera<float>* camera;
+  const Image8* valid;  // pixels that are rendered; the others stay 0
+  Pose world_from_camera;
+  const Light* light;  // in camera axes
+};
+
+// Linear radiance, RGB, 1 = full scale; the parts only if asked for.
+struct Film {
+  ImageF radiance;
+  ImageF direct, indirect;
+};
+
+// A radiance that was not finite: it is left out of its pixel's mean, counted, and the first is named.
+struct Failure {
+  int64_t count = 0;
+  int x = -1, y = -1, sample = -1;  // of the first, in reading order
+};
+
+struct PathCount {
+  int64_t samples = 0, rays = 0;
+  Failure failure;
+};
+
+// Renders one frame. Randomness is a function of (seed, frame, pixel, sample, dimension). A single sample
+// goes through the pixel's centre, several are spread over its square. The film must be empty or of the
+// camera's size; with_parts asks for direct and indirect light separately. Same bytes for any number of
+// threads.
+PathCount RenderFrame(const PathScene& scene, const View& view, const PathOptions& options, uint64_t seed,
+                      int frame, bool with_parts, Film* film);
+
+// The origin of a ray that leaves a surface at `point` to the side of `normal`: moved in units of the
+// coordinates' own floating-point steps, so that the ray can't meet the surface that it leaves (Wächter and
+// Binder 2019, "A fast and robust method for avoiding self-intersection", Ray Tracing Gems ch. 6).
+Vec3f OffsetOrigin(const Vec3f& point, const Vec3f& normal);
+
+}  // namespace lumen
