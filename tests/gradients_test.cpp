@@ -217,22 +217,30 @@ TEST(Shading, DerivativesMatchFiniteDifferences) {
   const Vec3d point(4, -6, 20);
   for (Reflectance kind : {Reflectance::kLambertian, Reflectance::kFree, Reflectance::kUnlit}) {
     Vec3d output(-0.5, -1, 0.2), normal = Vec3d(-0.2, 0.4, -1).normalized();
-    const Shading<double> shading = Shade(kind, output, normal, light, point);
+    Vec3d ambient(0.3, 0.2, 0.1);
+    const Shading<double> shading = Shade(kind, output, normal, light, point, ambient);
     for (int c = 0; c < 3; ++c) {
-      auto radiance = [&] { return Shade(kind, output, normal, light, point).radiance[c]; };
+      auto radiance = [&] { return Shade(kind, output, normal, light, point, ambient).radiance[c]; };
       EXPECT_NEAR(shading.by_output[c], Difference(radiance, &output[c]), 1e-9);
       for (int d = 0; d < 3; ++d)
         EXPECT_NEAR(shading.by_normal(c, d), Difference(radiance, &normal[d]), 1e-9);
+      EXPECT_NEAR(shading.ambient[c], ambient[c] * Difference(radiance, &ambient[c]), 1e-9);
     }
   }
 }
 
 // The whole loss of a batch of rays in a lumen with two lights, by every kind of parameter.
-class RayLossGradient : public testing::TestWithParam<Reflectance> {};
+struct LookOfWall {
+  Reflectance reflectance;
+  Interreflection interreflection;
+};
+class RayLossGradient : public testing::TestWithParam<LookOfWall> {};
 
 TEST_P(RayLossGradient, MatchesFiniteDifferences) {
   FieldOptions options;
-  options.reflectance = GetParam();
+  options.reflectance = GetParam().reflectance;
+  options.interreflection = GetParam().interreflection;
+  options.ambient_hidden = {7};
   options.grid.levels = 3;
   options.grid.log2_table_size = 9;
   options.initial.radius_mm = 8;
@@ -251,7 +259,8 @@ TEST_P(RayLossGradient, MatchesFiniteDifferences) {
   Light light;
   light.sources.push_back({Vec3d(1, 0.5, 0), Vec3d::UnitZ(), 2.0, Vec3d(300, 200, 150)});
   light.sources.push_back({Vec3d(-1, 0.2, 0), Vec3d::UnitZ(), 1.0, Vec3d(100, 200, 150)});
-  const std::vector<FrameLight<double>> lights = {LightOfFrame<double>(light, pose, Vec3d::Zero())};
+  std::vector<FrameLight<double>> lights = {LightOfFrame<double>(light, pose, Vec3d::Zero())};
+  lights[0].mean_radiance = Vec3d(0.3, 0.2, 0.1);
   std::vector<double> log_gain = {0.1};
 
   RayBatch<double> batch;
@@ -269,7 +278,7 @@ TEST_P(RayLossGradient, MatchesFiniteDifferences) {
     batch.rays.push_back(ray);
     for (int k = 0; k < 12; ++k) batch.distance.push_back(1 + 1.2 * k + 0.3 * Random(state));
   }
-  LossSettings<double> settings{0.9, 1 / 2.2, 0.1, 0.3, 0.1, 0.0, 1.0 / 6};
+  LossSettings<double> settings{0.9, 1 / 2.2, 0.1, 0.0, 0.1, 0.0, 0.0, 1.0 / 6};
 
   RayLoss<double> ray_loss(&field);
   std::vector<double> unused(field.network_size());
@@ -277,7 +286,7 @@ TEST_P(RayLossGradient, MatchesFiniteDifferences) {
   auto loss = [&] {
     const LossTerms terms = ray_loss.Evaluate(parameters.data(), batch, lights, log_gain, settings,
                                               unused.data(), &(unused_gain = 0));
-    return terms.photometric + terms.eikonal + terms.albedo;
+    return terms.Sum();
   };
   std::vector<double> gradient;
   double gain_gradient = 0;
@@ -297,30 +306,33 @@ TEST_P(RayLossGradient, MatchesFiniteDifferences) {
     largest = std::max(largest, std::abs(expected));
     compared += expected != 0;
   };
-  settings.albedo_weight = 0;
   analytic();
   for (size_t i = 0; i < field.grid_size(); i += 3) compare(i);
   for (size_t i = field.grid_size(); i < parameters.size(); ++i) compare(i);
   EXPECT_GT(compared, 200);
   EXPECT_GT(largest, 1e-2);
-  if (GetParam() != Reflectance::kUnlit) {
+  if (GetParam().reflectance != Reflectance::kUnlit) {
     EXPECT_NEAR(gain_gradient, Difference(loss, &log_gain[0]), 1e-7);
   }
-  if (GetParam() != Reflectance::kLambertian) return;
-  // The pull on the albedo acts on the colour network (the last parameters: 10·(5 + 3) + 10 + 3·10 + 3) and
-  // not on the weights of the samples.
+  if (GetParam().reflectance != Reflectance::kLambertian) return;
+  // The pulls act on the networks that put the numbers out and not on the weights of the samples.
+  const size_t color_end = field.color_bias_begin() + 3;
   const std::vector<double> without = gradient;
   settings.albedo_weight = 0.3;
+  settings.ambient_weight = 0.2;
   analytic();
-  for (size_t i = parameters.size() - 123; i < parameters.size(); ++i) compare(i);
-  // Nor does it push the level, which the last biases set.
-  EXPECT_GT(std::abs(gradient[parameters.size() - 100] - without[parameters.size() - 100]), 1e-6);
-  for (size_t i = parameters.size() - 3; i < parameters.size(); ++i)
-    EXPECT_NEAR(gradient[i], without[i], 1e-12);
+  for (size_t i = color_end - 123; i < parameters.size(); ++i) compare(i);  // 10·(5 + 3) + 10 + 3·10 + 3
+  // Nor do they push the level, which the last biases set.
+  EXPECT_GT(std::abs(gradient[color_end - 100] - without[color_end - 100]), 1e-6);
+  for (size_t i = color_end - 3; i < color_end; ++i) EXPECT_NEAR(gradient[i], without[i], 1e-12);
+  EXPECT_NEAR(gradient.back(), without.back(), 1e-12);
 }
 
-INSTANTIATE_TEST_SUITE_P(Reflectances, RayLossGradient,
-                         testing::Values(Reflectance::kLambertian, Reflectance::kFree, Reflectance::kUnlit));
+INSTANTIATE_TEST_SUITE_P(Looks, RayLossGradient,
+                         testing::Values(LookOfWall{Reflectance::kLambertian, Interreflection::kNone},
+                                         LookOfWall{Reflectance::kLambertian, Interreflection::kMean},
+                                         LookOfWall{Reflectance::kFree, Interreflection::kNone},
+                                         LookOfWall{Reflectance::kUnlit, Interreflection::kNone}));
 
 }  // namespace
 }  // namespace lumen

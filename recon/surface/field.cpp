@@ -15,10 +15,21 @@ MlpShape ColorShape(const FieldOptions& options) {
   return {options.features + 3 + view, options.color_hidden, 3, Activation::kRelu};
 }
 
+MlpShape AmbientShape(const FieldOptions& options) {
+  const bool none = options.interreflection == Interreflection::kNone ||
+                    options.reflectance != Reflectance::kLambertian;
+  if (none) return {0, {}, 0, Activation::kSquareplus};
+  return {3, options.ambient_hidden, 1, Activation::kSquareplus};
+}
+
 // The distance network starts close to nothing, so that training starts from the initial surface; colours
 // start near the middle of their range.
 constexpr double kSdfStart = 0.02;
 constexpr double kColorStart = 0.1;
+
+// Log of the ambient factor. In a closed cavity that is seen whole it is 0 (the integrating sphere); a lumen
+// is open and unevenly lit.
+constexpr double kAmbientStart = -1;
 
 }  // namespace
 
@@ -30,6 +41,7 @@ Field<T>::Field(const FieldOptions& options, const InitialSurface& initial, cons
       grid_(options.grid, box),
       sdf_(SdfShape(options)),
       color_(ColorShape(options)),
+      ambient_(AmbientShape(options)),
       unit_(static_cast<T>(options.unit_mm)) {}
 
 template <class T>
@@ -37,6 +49,10 @@ void Field<T>::Initialise(uint64_t seed, T* parameters) const {
   grid_.Initialise(seed * 3, parameters);
   sdf_.Initialise(seed * 3 + 1, kSdfStart, parameters + grid_size());
   color_.Initialise(seed * 3 + 2, kColorStart, parameters + grid_size() + sdf_.parameter_count());
+  if (!has_ambient()) return;
+  T* ambient = parameters + grid_size() + sdf_.parameter_count() + color_.parameter_count();
+  ambient_.Initialise(seed * 3 + 3, kColorStart, ambient);
+  ambient[ambient_.parameter_count() - 1] = static_cast<T>(kAmbientStart);
 }
 
 template <class T>
@@ -144,12 +160,25 @@ void Field<T>::Color(const T* parameters, SurfacePass* pass) const {
   }
   color_.Forward(parameters + grid_size() + sdf_.parameter_count(), pass->color_input, 3,
                  Mlp<T>::Keep::kSlopes, &pass->color);
+  if (!has_ambient()) return;
+  pass->ambient_input.Resize(3, tiles);
+  for (int tile = 0; tile < tiles; ++tile) {
+    const T* place = pass->input.Row(tile, grid_.outputs());
+    std::copy(place, place + 3 * kTile, pass->ambient_input.Tile(tile));
+  }
+  ambient_.Forward(parameters + grid_size() + sdf_.parameter_count() + color_.parameter_count(),
+                   pass->ambient_input, 1, Mlp<T>::Keep::kSlopes, &pass->ambient);
 }
 
 template <class T>
 void Field<T>::ColorBackward(const T* parameters, SurfacePass* pass, T* network_gradient) const {
   color_.Backward(parameters + grid_size() + sdf_.parameter_count(), pass->color_input, pass->color_delta,
                   &pass->color, network_gradient + sdf_.parameter_count(), &pass->color_input_delta);
+  if (has_ambient()) {
+    const size_t begin = sdf_.parameter_count() + color_.parameter_count();
+    ambient_.Backward(parameters + grid_size() + begin, pass->ambient_input, pass->ambient_delta,
+                      &pass->ambient, network_gradient + begin, nullptr);
+  }
   pass->normal_delta.Resize(3, pass->positions.tiles());
   if (!sees_view()) return pass->normal_delta.SetZero();
   for (int tile = 0; tile < pass->positions.tiles(); ++tile) {

@@ -21,6 +21,12 @@ enum class Reflectance {
   kUnlit,       // the pixel's own value, no light modelled: NeuS
 };
 
+// What the wall receives from the rest of the wall.
+enum class Interreflection {
+  kNone,  // nothing: the paper's model
+  kMean,  // π · the frame's mean radiance · exp(a smooth function of place that is learnt)
+};
+
 struct FieldOptions {
   GridOptions grid;
   InitialSurfaceOptions initial;
@@ -29,6 +35,8 @@ struct FieldOptions {
   int features = 15;  // numbers that the distance network hands to the colour network
   double unit_mm = 68;
   Reflectance reflectance = Reflectance::kLambertian;
+  Interreflection interreflection = Interreflection::kMean;  // of a kLambertian wall; others have none
+  std::vector<int> ambient_hidden = {16};
 };
 
 template <class T>
@@ -39,12 +47,19 @@ class Field {
 
   // Parameters: the grid's tables first, then the networks'.
   size_t grid_size() const { return grid_.parameter_count(); }
-  size_t network_size() const { return sdf_.parameter_count() + color_.parameter_count(); }
+  size_t network_size() const {
+    return sdf_.parameter_count() + color_.parameter_count() + ambient_.parameter_count();
+  }
   size_t parameter_count() const { return grid_size() + network_size(); }
   const Grid<T>& grid() const { return grid_; }
   const Eigen::AlignedBox3d& box() const { return box_; }
   const FieldOptions& options() const { return options_; }
   void Initialise(uint64_t seed, T* parameters) const;
+  // Where the biases of the colour network's three outputs are.
+  size_t color_bias_begin() const {
+    return grid_size() + sdf_.parameter_count() + color_.parameter_count() - 3;
+  }
+  bool has_ambient() const { return ambient_.parameter_count() > 0; }
 
   // Signed distances alone, of all tiles of positions.
   struct ValuePass {
@@ -66,12 +81,17 @@ class Field {
     Panel<T> gradient_delta;  // in: ∂loss/∂gradient, 3 rows
     Panel<T> normal;          // in, before Color: unit normals, 3 rows
     Panel<T> color_delta;     // in: ∂loss/∂colour network's outputs, 3 rows
+    Panel<T> ambient_delta;   // in, if the field has_ambient: ∂loss/∂ambient_output, 1 row
     Panel<T> normal_delta;    // out of ColorBackward, 3 rows: 0 for networks that don't see the normal
     // Between the passes:
     Panel<T> input, jacobian, output_delta, direction, scaled_direction, input_delta, color_input,
         color_input_delta;
-    typename Mlp<T>::Pass sdf, color;
+    Panel<T> ambient_input;
+    typename Mlp<T>::Pass sdf, color, ambient;
     const Panel<T>& color_output() const { return color.value.back(); }
+    // Log of the irradiance from the rest of the wall over π · the frame's mean radiance; if the field
+    // has_ambient.
+    const Panel<T>& ambient_output() const { return ambient.value.back(); }
   };
   void Surface(const T* parameters, SurfacePass* pass) const;
   void Color(const T* parameters, SurfacePass* pass) const;
@@ -93,6 +113,7 @@ class Field {
   Grid<T> grid_;
   Mlp<T> sdf_;
   Mlp<T> color_;
+  Mlp<T> ambient_;  // of place alone: what comes from all over the lumen is smooth
   T unit_;
 };
 

@@ -17,9 +17,10 @@ FrameLight<T> LightOfFrame(const Light& light, const Pose& world_from_camera, co
 
 template <class T>
 Shading<T> Shade(Reflectance reflectance, const Vec3<T>& output, const Vec3<T>& normal,
-                 const FrameLight<T>& light, const Vec3<T>& point) {
+                 const FrameLight<T>& light, const Vec3<T>& point, const Vec3<T>& ambient) {
   Shading<T> result;
   result.by_normal.setZero();
+  result.ambient.setZero();
   if (reflectance == Reflectance::kUnlit) {
     for (int c = 0; c < 3; ++c) {
       const T value = Sigmoid(output[c]);
@@ -43,7 +44,8 @@ Shading<T> Shade(Reflectance reflectance, const Vec3<T>& output, const Vec3<T>& 
   }
   for (int c = 0; c < 3; ++c) {
     const T reflected = std::exp(output[c]) * (lambertian ? T(1 / kPi) : T(1));
-    result.radiance[c] = reflected * incident[c];
+    if (lambertian) result.ambient[c] = reflected * ambient[c];
+    result.radiance[c] = reflected * incident[c] + result.ambient[c];
     result.by_normal.row(c) *= reflected;
   }
   result.by_output = result.radiance;
@@ -53,7 +55,7 @@ Shading<T> Shade(Reflectance reflectance, const Vec3<T>& output, const Vec3<T>& 
 #define LUMEN_INSTANTIATE(T)                                                                      \
   template FrameLight<T> LightOfFrame<T>(const Light&, const Pose&, const Vec3d&);                \
   template Shading<T> Shade<T>(Reflectance, const Vec3<T>&, const Vec3<T>&, const FrameLight<T>&, \
-                               const Vec3<T>&);
+                               const Vec3<T>&, const Vec3<T>&);
 LUMEN_INSTANTIATE(float)
 LUMEN_INSTANTIATE(double)
 #undef LUMEN_INSTANTIATE

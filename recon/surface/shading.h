@@ -1,6 +1,6 @@
 // What the colour network's outputs send to the camera under the endoscope's light. Only co-located light is
 // seen from where it comes from; every source's own place, direction and distance count here. Shadows of
-// sources off the axis and light from other surfaces are not modelled.
+// sources off the axis are not modelled.
 #pragma once
 
 #include <vector>
@@ -20,6 +20,7 @@ struct FrameLight {
     Vec3<T> intensity;
   };
   std::vector<Source> sources;
+  Vec3<T> mean_radiance = Vec3<T>::Zero();  // over the frame's pixels, at gain 1
 };
 template <class T>
 FrameLight<T> LightOfFrame(const Light& light, const Pose& world_from_camera, const Vec3d& origin);
@@ -30,12 +31,14 @@ struct Shading {
   Vec3<T> radiance;
   Vec3<T> by_output;  // ∂radiance_c/∂output_c; the others are 0
   Mat3<T> by_normal;  // row c: ∂radiance_c/∂normal
+  Vec3<T> ambient;    // the part of the radiance that goes back to `ambient`
 };
 
-// kLambertian: exp(output)/π · Σ intensity · irradiance · max(0, n·l); kFree: exp(output) · Σ intensity ·
-// irradiance; kUnlit: 1/(1 + e^−output). normal: unit, into the lumen.
+// kLambertian: exp(output)/π · (Σ intensity · irradiance · max(0, n·l) + ambient); kFree: exp(output) · Σ
+// intensity · irradiance; kUnlit: 1/(1 + e^−output). normal: unit, into the lumen. ambient: irradiance from
+// the rest of the wall, kLambertian only.
 template <class T>
 Shading<T> Shade(Reflectance reflectance, const Vec3<T>& output, const Vec3<T>& normal,
-                 const FrameLight<T>& light, const Vec3<T>& point);
+                 const FrameLight<T>& light, const Vec3<T>& point, const Vec3<T>& ambient);
 
 }  // namespace lumen

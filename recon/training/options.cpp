@@ -25,6 +25,7 @@ albedo = 0.0
 };
 
 const char* const kReflectanceNames[] = {"lambertian", "free", "unlit"};
+const char* const kInterreflectionNames[] = {"none", "mean"};
 
 std::vector<int> Widths(const ConfigTable& table, const std::string& key, const std::vector<int>& otherwise) {
   if (!table.Has(key)) return otherwise;
@@ -54,6 +55,11 @@ void ReadField(const ConfigTable& root, FieldOptions* field) {
                                              {kReflectanceNames, kReflectanceNames + 3});
     for (int i = 0; i < 3; ++i)
       if (name == kReflectanceNames[i]) field->reflectance = static_cast<Reflectance>(i);
+    const std::string source =
+        network->Choice("interreflection", kInterreflectionNames[int(field->interreflection)],
+                        {kInterreflectionNames, kInterreflectionNames + 2});
+    field->interreflection = source == "mean" ? Interreflection::kMean : Interreflection::kNone;
+    field->ambient_hidden = Widths(*network, "ambient_hidden", field->ambient_hidden);
   }
   if (const auto initial = root.Optional("initial")) {
     field->initial.radius_mm = initial->Number("radius_mm", field->initial.radius_mm, kPositive);
@@ -81,6 +87,7 @@ void ReadRest(const ConfigTable& root, TrainOptions* options) {
     l.eikonal = loss->Number("eikonal", l.eikonal, kNotNegative);
     l.albedo = loss->Number("albedo", l.albedo, kNotNegative);
     l.albedo_final = loss->Number("albedo_final", l.albedo_final, kPositive);
+    l.ambient = loss->Number("ambient", l.ambient, kNotNegative);
     l.albedo_width = loss->Number("albedo_width", l.albedo_width, kPositive);
   }
   if (const auto schedule = root.Optional("schedule")) {
@@ -143,15 +150,17 @@ std::string FormatTrainOptions(const TrainOptions& o) {
       << "\n\n[network]\nsdf_hidden = " << Array(o.field.sdf_hidden)
       << "\ncolor_hidden = " << Array(o.field.color_hidden) << "\nfeatures = " << o.field.features
       << "\nunit_mm = " << o.field.unit_mm << "\nreflectance = \""
-      << kReflectanceNames[int(o.field.reflectance)]
-      << "\"\n\n[initial]\nradius_mm = " << o.field.initial.radius_mm
+      << kReflectanceNames[int(o.field.reflectance)] << "\"\ninterreflection = \""
+      << kInterreflectionNames[int(o.field.interreflection)]
+      << "\"\nambient_hidden = " << Array(o.field.ambient_hidden)
+      << "\n\n[initial]\nradius_mm = " << o.field.initial.radius_mm
       << "\nreach_mm = " << o.field.initial.reach_mm << "\n\n[bounds]\nahead_mm = " << o.bounds.ahead_mm
       << "\naside_mm = " << o.bounds.aside_mm << "\n\n[sampling]\nrays = " << o.sampling.rays
       << "\ncoarse = " << o.sampling.coarse << "\nsurface = " << o.sampling.surface
       << "\nspread = " << o.sampling.spread << "\nsurface_spacing = " << o.sampling.surface_spacing
       << "\nweight_threshold = " << o.sampling.weight_threshold << "\n\n[loss]\neikonal = " << o.loss.eikonal
       << "\nalbedo = " << o.loss.albedo << "\nalbedo_final = " << o.loss.albedo_final
-      << "\nalbedo_width = " << o.loss.albedo_width
+      << "\nambient = " << o.loss.ambient << "\nalbedo_width = " << o.loss.albedo_width
       << "\n\n[schedule]\niterations = " << o.schedule.iterations << "\nseconds = " << o.schedule.seconds
       << "\nlearning_rate = " << o.schedule.learning_rate
       << "\nlearning_rate_final = " << o.schedule.learning_rate_final

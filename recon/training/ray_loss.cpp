@@ -16,6 +16,7 @@ LossTerms& LossTerms::operator+=(const LossTerms& other) {
   photometric += other.photometric;
   eikonal += other.eikonal;
   albedo += other.albedo;
+  ambient += other.ambient;
   active_samples += other.active_samples;
   return *this;
 }
@@ -59,7 +60,7 @@ void RayLoss<T>::SelectActive(const RayBatch<T>& batch, const LossSettings<T>& s
 
 template <class T>
 void RayLoss<T>::ShadeActive(const T* parameters, const RayBatch<T>& batch,
-                             const std::vector<FrameLight<T>>& lights) {
+                             const std::vector<FrameLight<T>>& lights, const std::vector<T>& log_gain) {
   const int count = static_cast<int>(active_.size());
   const int tiles = TilesFor(count);
   surface_.positions.Resize(3, tiles);
@@ -91,9 +92,16 @@ void RayLoss<T>::ShadeActive(const T* parameters, const RayBatch<T>& batch,
     const Vec3<T> point(surface_.positions.At(0, i), surface_.positions.At(1, i),
                         surface_.positions.At(2, i));
     const Vec3<T> normal(surface_.normal.At(0, i), surface_.normal.At(1, i), surface_.normal.At(2, i));
+    const int frame = batch.rays[sample.ray].frame;
+    Vec3<T> ambient = Vec3<T>::Zero();
+    if (field_->has_ambient()) {
+      // What the pixels show of the other places holds the frame's gain already.
+      const T factor = T(kPi) * std::exp(surface_.ambient_output().At(0, i) - log_gain[frame]);
+      ambient = factor * lights[frame].mean_radiance;
+    }
     shading_[i] =
         Shade(field_->options().reflectance, Vec3<T>(output.At(0, i), output.At(1, i), output.At(2, i)),
-              normal, lights[batch.rays[sample.ray].frame], point);
+              normal, lights[frame], point, ambient);
   }
 }
 
@@ -102,8 +110,12 @@ double RayLoss<T>::ComparePixels(const RayBatch<T>& batch, const std::vector<T>&
                                  const LossSettings<T>& settings, T* log_gain_gradient) {
   const bool lit = field_->options().reflectance != Reflectance::kUnlit;
   radiance_delta_.assign(batch.rays.size(), Vec3<T>::Zero());
+  ambient_.assign(batch.rays.size(), Vec3<T>::Zero());
   for (size_t i = 0; i < active_.size(); ++i) {
-    if (active_[i].weight > 0) radiance_delta_[active_[i].ray] += active_[i].weight * shading_[i].radiance;
+    const Active& sample = active_[i];
+    if (!(sample.weight > 0)) continue;
+    radiance_delta_[sample.ray] += sample.weight * shading_[i].radiance;
+    ambient_[sample.ray] += sample.weight * shading_[i].ambient;
   }
   double loss = 0;
   const T share = settings.per_ray / 3;
@@ -116,7 +128,7 @@ double RayLoss<T>::ComparePixels(const RayBatch<T>& batch, const std::vector<T>&
       const Term<T> error = PhotometricLoss(pixel.value, ray.observed[c], ray.bound[c]);
       loss += share * error.value;
       const T delta = share * error.slope * pixel.slope;  // ∂loss/∂linear
-      log_gain_gradient[ray.frame] += delta * linear;
+      log_gain_gradient[ray.frame] += delta * (linear - exposure * ambient_[r][c]);
       radiance_delta_[r][c] = delta * exposure;
     }
   }
@@ -133,6 +145,8 @@ void RayLoss<T>::BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& 
   surface_.value_delta.SetZero();
   surface_.gradient_delta.SetZero();
   surface_.color_delta.SetZero();
+  surface_.ambient_delta.Resize(1, tiles);
+  surface_.ambient_delta.SetZero();
   weight_delta_.assign(weight_.size(), T(0));
   distance_delta_.resize(weight_.size());
   for (size_t i = 0; i < active_.size(); ++i) {
@@ -142,9 +156,20 @@ void RayLoss<T>::BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& 
     weight_delta_[size_t(sample.ray) * n + sample.sample] = delta.dot(shading_[i].radiance);
     for (int c = 0; c < 3; ++c) {
       surface_.color_delta.At(c, i) = delta[c] * sample.weight * shading_[i].by_output[c];
+      surface_.ambient_delta.At(0, i) += delta[c] * sample.weight * shading_[i].ambient[c];
     }
   }
-  if (settings.albedo_weight > 0) terms->albedo = PullAlbedo(settings);
+  if (settings.albedo_weight > 0) {
+    const T strength = settings.albedo_weight * settings.per_ray / 3;
+    for (int c = 0; c < 3; ++c) {
+      terms->albedo +=
+          Pull(strength, settings.albedo_width, surface_.color_output(), c, &surface_.color_delta);
+    }
+  }
+  if (field_->has_ambient()) {
+    terms->ambient = Pull(settings.ambient_weight * settings.per_ray, settings.albedo_width,
+                          surface_.ambient_output(), 0, &surface_.ambient_delta);
+  }
   for (size_t r = 0; r < batch.rays.size(); ++r) {
     RayWeightsBackward(n, &signed_distance_[r * n], settings.sharpness, &transmittance_[r * n],
                        &weight_delta_[r * n], &distance_delta_[r * n]);
@@ -154,31 +179,28 @@ void RayLoss<T>::BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& 
   }
 }
 
-// Pulls the samples' log albedo towards its mean over the batch. The mean is the batch's own and moves with
-// it, so the pull is on the spread alone and never on the level: a pull to a fixed mean would hold the whole
-// reconstruction at the scale at which it starts. It acts on the albedo alone: a weight that depended on it
-// would move the surface to where the albedo is mean.
+// Pulls a logarithm that the networks put out (of the albedo, of the ambient factor) towards its mean over
+// the batch. The mean is the batch's own and moves with it, so the pull is on the spread alone and never on
+// the level: a pull to a fixed mean would hold the whole reconstruction at the scale at which it starts. It
+// acts on the output alone: a weight that depended on it would move the surface to where the output is mean.
 template <class T>
-double RayLoss<T>::PullAlbedo(const LossSettings<T>& settings) {
+double RayLoss<T>::Pull(T strength, T width, const Panel<T>& output, int row, Panel<T>* delta) {
+  T weight = 0, mean = 0, mean_slope = 0;
+  for (size_t i = 0; i < active_.size(); ++i) {
+    weight += active_[i].weight;
+    mean += active_[i].weight * output.At(row, i);
+  }
+  if (!(weight > 0)) return 0;
+  mean /= weight;
   double loss = 0;
-  const T share = settings.albedo_weight * settings.per_ray / 3;
   pull_.resize(active_.size());
-  for (int c = 0; c < 3; ++c) {
-    T weight = 0, mean = 0, mean_slope = 0;
-    for (size_t i = 0; i < active_.size(); ++i) {
-      weight += active_[i].weight;
-      mean += active_[i].weight * surface_.color_output().At(c, i);
-    }
-    if (!(weight > 0)) return 0;
-    mean /= weight;
-    for (size_t i = 0; i < active_.size(); ++i) {
-      pull_[i] = HuberLoss(surface_.color_output().At(c, i) - mean, settings.albedo_width);
-      loss += share * active_[i].weight * pull_[i].value;
-      mean_slope += active_[i].weight * pull_[i].slope / weight;
-    }
-    for (size_t i = 0; i < active_.size(); ++i) {
-      surface_.color_delta.At(c, i) += share * active_[i].weight * (pull_[i].slope - mean_slope);
-    }
+  for (size_t i = 0; i < active_.size(); ++i) {
+    pull_[i] = HuberLoss(output.At(row, i) - mean, width);
+    loss += strength * active_[i].weight * pull_[i].value;
+    mean_slope += active_[i].weight * pull_[i].slope / weight;
+  }
+  for (size_t i = 0; i < active_.size(); ++i) {
+    delta->At(row, i) += strength * active_[i].weight * (pull_[i].slope - mean_slope);
   }
   return loss;
 }
@@ -191,7 +213,7 @@ LossTerms RayLoss<T>::Evaluate(const T* parameters, const RayBatch<T>& batch,
   FindWeights(parameters, batch, settings);
   SelectActive(batch, settings);
   terms.active_samples = static_cast<int64_t>(active_.size());
-  ShadeActive(parameters, batch, lights);
+  ShadeActive(parameters, batch, lights, log_gain);
   terms.photometric = ComparePixels(batch, log_gain, settings, log_gain_gradient);
   BackToSamples(batch, settings, &terms);
   field_->ColorBackward(parameters, &surface_, network_gradient);

@@ -37,8 +37,9 @@ struct LossSettings {
   T sharpness;      // s, 1/mm
   T inverse_gamma;  // of the comparison
   T eikonal_weight;
-  T albedo_weight;  // of the pull of the albedo to the batch's mean; kLambertian only
-  T albedo_width;   // of its Huber loss, in log
+  T albedo_weight;   // of the pull of the albedo to the batch's mean; kLambertian only
+  T albedo_width;    // of its Huber loss, in log
+  T ambient_weight;  // of the same pull on the log ambient factor
   // Samples whose weight and whose influence on any weight are below this are left out.
   T weight_threshold;
   T per_ray;  // 1/number of rays of the whole step
@@ -49,8 +50,10 @@ struct LossTerms {
   double photometric = 0;
   double eikonal = 0;
   double albedo = 0;
+  double ambient = 0;
   int64_t active_samples = 0;
 
+  double Sum() const { return photometric + eikonal + albedo + ambient; }
   LossTerms& operator+=(const LossTerms& other);
 };
 
@@ -79,20 +82,22 @@ class RayLoss {
   };
   void FindWeights(const T* parameters, const RayBatch<T>& batch, const LossSettings<T>& settings);
   void SelectActive(const RayBatch<T>& batch, const LossSettings<T>& settings);
-  void ShadeActive(const T* parameters, const RayBatch<T>& batch, const std::vector<FrameLight<T>>& lights);
+  void ShadeActive(const T* parameters, const RayBatch<T>& batch, const std::vector<FrameLight<T>>& lights,
+                   const std::vector<T>& log_gain);
   double ComparePixels(const RayBatch<T>& batch, const std::vector<T>& log_gain,
                        const LossSettings<T>& settings, T* log_gain_gradient);
-  double PullAlbedo(const LossSettings<T>& settings);
+  double Pull(T strength, T width, const Panel<T>& output, int row, Panel<T>* delta);
   void BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& settings, LossTerms* terms);
 
   const Field<T>* field_;
   typename Field<T>::ValuePass value_;
   typename Field<T>::SurfacePass surface_;
   std::vector<T> signed_distance_, transmittance_, weight_, weight_delta_, distance_delta_;  // rays × samples
-  std::vector<Vec3<T>> radiance_delta_;                                                      // a ray
+  std::vector<Vec3<T>> ambient_;         // a ray: the part of its radiance that doesn't follow the gain
+  std::vector<Vec3<T>> radiance_delta_;  // a ray
   std::vector<Active> active_;
   std::vector<Shading<T>> shading_;  // an active sample
-  std::vector<Term<T>> pull_;        // on its albedo, of one channel
+  std::vector<Term<T>> pull_;        // on one of its outputs
 };
 
 }  // namespace lumen

@@ -86,7 +86,7 @@ class Run {
       const StepReport step = trainer_.Step(done);
       if (by_clock()) state.seconds = seconds_before + SecondsSince(start);
       if (!step.skipped) {
-        loss += step.loss.photometric + step.loss.eikonal + step.loss.albedo;
+        loss += step.loss.Sum();
         ++loss_weight;
       }
       CheckSkipped();
@@ -96,7 +96,7 @@ class Run {
         progress.Update(done, "loss " + std::to_string(loss / loss_weight));
         loss = loss_weight = 0;
       }
-      result_.final_loss = step.loss.photometric + step.loss.eikonal + step.loss.albedo;
+      result_.final_loss = step.loss.Sum();
       if (elapsed - last_checkpoint >= options_.schedule.checkpoint_seconds) {
         last_checkpoint = elapsed;
         WriteCheckpoint(run_.folder / "checkpoint", settings_, state);
@@ -129,6 +129,7 @@ class Run {
                                          {"photometric", step.loss.photometric},
                                          {"eikonal", step.loss.eikonal},
                                          {"albedo", step.loss.albedo},
+                                         {"ambient", step.loss.ambient},
                                          {"s_per_mm", step.sharpness_per_mm},
                                          {"active_samples", step.loss.active_samples},
                                          {"skipped_steps", state.skipped_steps},

@@ -40,6 +40,7 @@ Trainer::Trainer(const TrainingFrames& frames, const TrainOptions& options, uint
   field_ = std::make_unique<Field<float>>(options.field, initial, Eigen::AlignedBox3d(-half, half));
   for (const Pose& pose : frames.world_from_camera()) {
     lights_.push_back(LightOfFrame<float>(frames.light(), pose, origin_));
+    lights_.back().mean_radiance = frames.MeanRadiance(static_cast<int>(lights_.size()) - 1).cast<float>();
   }
   for (int begin = 0; begin < options.sampling.rays; begin += kChunkRays) {
     auto chunk = std::make_unique<Chunk>(field_.get());
@@ -84,15 +85,14 @@ void Trainer::MatchColorsToInitialSurface(const InitialSurface& initial) {
     const Vec3f n(normal.At(0, r), normal.At(1, r), normal.At(2, r));
     const Vec3f point(positions.At(0, r), positions.At(1, r), positions.At(2, r));
     const Shading<float> shading =
-        Shade<float>(options_.field.reflectance, Vec3f::Zero(), n, lights_[ray.frame], point);
+        Shade<float>(options_.field.reflectance, Vec3f::Zero(), n, lights_[ray.frame], point, Vec3f::Zero());
     for (int c = 0; c < 3; ++c) {
       if (ray.bound[c] != PixelBound::kExact || !(shading.radiance[c] > 0)) continue;
       const float linear = std::pow(ray.observed[c], 1 / static_cast<float>(frames_.inverse_gamma()));
       log_ratio[c].push_back(std::log(linear / (ray.exposure * shading.radiance[c])));
     }
   }
-  // The biases of the colour network's outputs are its last parameters.
-  float* bias = &state_.parameters[state_.parameters.size() - 3];
+  float* bias = &state_.parameters[field_->color_bias_begin()];
   for (int c = 0; c < 3; ++c) {
     if (log_ratio[c].empty()) continue;
     auto middle = log_ratio[c].begin() + static_cast<std::ptrdiff_t>(log_ratio[c].size() / 2);
@@ -113,6 +113,7 @@ LossSettings<float> Trainer::SettingsAt(double progress) const {
       lambertian ? static_cast<float>(options_.loss.albedo * std::pow(options_.loss.albedo_final, progress))
                  : 0.0f;
   settings.albedo_width = static_cast<float>(options_.loss.albedo_width);
+  settings.ambient_weight = static_cast<float>(options_.loss.ambient);
   settings.weight_threshold = static_cast<float>(options_.sampling.weight_threshold);
   settings.per_ray = 1.0f / static_cast<float>(options_.sampling.rays);
   return settings;
@@ -129,7 +130,7 @@ void Trainer::RunChunk(int index, const LossSettings<float>& settings) {
                       RandomBits(step_key, static_cast<uint64_t>(index), 1), &chunk.batch);
   chunk.terms = chunk.loss.Evaluate(state_.parameters.data(), chunk.batch, lights_, state_.log_gain, settings,
                                     chunk.network_gradient.data(), chunk.log_gain_gradient.data());
-  double sum = chunk.terms.photometric + chunk.terms.eikonal + chunk.terms.albedo;
+  double sum = chunk.terms.Sum();
   for (float g : chunk.network_gradient) sum += g;
   chunk.finite = std::isfinite(sum) && chunk.loss.GridGradientIsFinite();
 }

@@ -86,6 +86,14 @@ void TrainingFrames::FindScale() {
   scale_ = std::pow(2 * sum / static_cast<double>(count), 1 / inverse_gamma());
 }
 
+Vec3d TrainingFrames::MeanRadiance(int frame) const {
+  Vec3d sum = Vec3d::Zero();
+  for (size_t pixel = 0; pixel < rays_.size(); ++pixel) {
+    for (int c = 0; c < 3; ++c) sum[c] += decoded_[frames_[frame].rgb[3 * pixel + c]] / vignetting_[pixel];
+  }
+  return sum / (frames_[frame].gain * static_cast<double>(rays_.size()));
+}
+
 void TrainingFrames::Draw(uint64_t draw, const Vec3d& origin, RayBatch<float>::Ray* ray) const {
   // Two independent numbers from the upper and the lower half.
   const size_t frame_index = ((draw >> 32) * frames_.size()) >> 32;

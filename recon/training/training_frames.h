@@ -27,6 +27,10 @@ class TrainingFrames {
   // 1/γ of the comparison; for an sRGB response that of the 2.2 which approximates it.
   double inverse_gamma() const;
 
+  // Mean over a frame's valid pixels of the radiance that they show, RGB, in units of full scale at gain 1
+  // (or at the frame's own gain, where that is unknown). Saturated pixels count as full scale.
+  Vec3d MeanRadiance(int frame) const;
+
   // Fills the pixel's part of a ray: direction and origin relative to `origin`, frame, exposure, floor,
   // observed value and its bounds. `draw`: 64 random bits that choose frame and pixel, uniformly.
   void Draw(uint64_t draw, const Vec3d& origin, RayBatch<float>::Ray* ray) const;
