@@ -106,8 +106,7 @@ class Renderer {
     result_.samples += count.samples;
     result_.rays += count.rays;
     NoteFailure(frame, count.failure);
-    const Image8 color = Develop(scene_.calibration.response, gain, film.radiance, vignetting, valid_);
-    WriteImage(FrameFile(options_.folder, frame, "color.png"), color);
+    WriteImage(FrameFile(options_.folder, frame, "color.png"), Photograph(frame, gain, film, vignetting));
     if (scene_.truth.c3vd || !scene_.truth.exact.empty()) {
       const Pose* previous = frame > 0 ? &scene_.world_from_camera[frame - 1] : nullptr;
       const FrameTruth truth =
@@ -115,6 +114,16 @@ class Renderer {
       if (scene_.truth.c3vd) WriteC3vd(frame, truth);
       if (!scene_.truth.exact.empty()) WriteExact(frame, film, truth);
     }
+  }
+
+  // What the sensor makes of a frame.
+  Image8 Photograph(int frame, double gain, const Film& film, const ImageF& vignetting) const {
+    const Response& response = scene_.calibration.response;
+    if (!scene_.sensor.noise) return Develop(response, gain, film.radiance, vignetting, valid_);
+    const ImageF signal =
+        Expose(*scene_.sensor.noise, film.radiance, vignetting, valid_, options_.seed, frame);
+    const ImageF no_more_vignetting(signal.width, signal.height, 1, 1.0f);
+    return Develop(response, gain, signal, no_more_vignetting, valid_);
   }
 
   void NoteFailure(int frame, const Failure& failure) {

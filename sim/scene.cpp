@@ -95,6 +95,7 @@ std::vector<std::string> NameEffects(const Scene& scene) {
   }
   if (scene.calibration.response.vignetting > 0) effects.push_back("vignetting");
   if (scene.sensor.auto_gain) effects.push_back("auto_gain");
+  if (scene.sensor.noise) effects.push_back("sensor_noise");
   if (!scene.calibration.mask.empty()) effects.push_back("mask");
   return effects;
 }

@@ -61,6 +61,7 @@ Sensor ReadSensor(const ConfigTable& table) {
     sensor.gain = table.Number("gain", sensor.gain, kPositive);
   }
   sensor.record_gain = table.Flag("record_gain", sensor.record_gain);
+  if (const auto noise = table.Optional("noise")) sensor.noise = ReadSensorNoise(*noise);
   return sensor;
 }
 

@@ -1,4 +1,5 @@
-// From linear radiance to what the colour file holds: vignetting, gain, saturation, gamma or sRGB, 8 bits.
+// From linear radiance to what the colour file holds: vignetting, noise, gain, saturation, gamma or sRGB, 8
+// bits.
 #pragma once
 
 #include <optional>
@@ -8,6 +9,7 @@
 #include "common/config.h"
 #include "common/image.h"
 #include "common/response.h"
+#include "sim/imaging/noise.h"
 
 namespace lumen {
 
@@ -23,7 +25,8 @@ struct AutoGain {
 struct Sensor {
   double gain = 1;
   std::optional<AutoGain> auto_gain;  // then `gain` doesn't count
-  bool record_gain = true;            // false: sequence.toml leaves the gains out
+  std::optional<SensorNoise> noise;
+  bool record_gain = true;  // false: sequence.toml leaves the gains out
 };
 
 // Reads the scene's [sensor].
