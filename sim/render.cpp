@@ -26,7 +26,8 @@ class Renderer {
       : scene_(scene),
         options_(options),
         wall_(scene.geometry.mesh),
-        path_scene_{&wall_, &scene.surface, RandomBits(options.seed, kSurfaceSeed)},
+        vertex_normals_(scene.surface.coat ? VertexNormals(scene.geometry.mesh) : std::vector<Vec3d>()),
+        path_scene_{&wall_, &scene.surface, RandomBits(options.seed, kSurfaceSeed), &vertex_normals_},
         camera_(scene.calibration.camera),
         fast_camera_(scene.calibration.camera),
         valid_(ValidPixels(scene.calibration)) {
@@ -66,6 +67,8 @@ class Renderer {
            scene_.truth.exact.end();
   }
 
+  bool WantsParts() const { return Wants("direct") || Wants("indirect") || Wants("glint"); }
+
   View ViewOf(int frame, const Camera<float>& camera, const Image8& valid) const {
     return {&camera, &valid, scene_.world_from_camera[frame], &scene_.calibration.light};
   }
@@ -102,7 +105,9 @@ class Renderer {
   void RenderOne(int frame, double gain, const ImageF& vignetting) {
     Film film;
     const PathCount count = RenderFrame(path_scene_, ViewOf(frame, fast_camera_, valid_), scene_.path,
-                                        options_.seed, frame, Wants("direct") || Wants("indirect"), &film);
+                                        options_.seed, frame, WantsParts(), &film);
+    // Without a coat there is no glint.
+    if (Wants("glint") && film.glint.empty()) film.glint = ImageF(valid_.width, valid_.height, 3);
     result_.samples += count.samples;
     result_.rays += count.rays;
     NoteFailure(frame, count.failure);
@@ -171,6 +176,7 @@ class Renderer {
     add("radiance", film.radiance, rgb);
     add("direct", film.direct, rgb);
     add("indirect", film.indirect, rgb);
+    add("glint", film.glint, rgb);
     if (Wants("albedo")) add("albedo", AlbedoMap(truth), rgb);
     add("z", truth.z, one);
     add("distance", truth.distance, one);
@@ -246,6 +252,7 @@ class Renderer {
   const Scene& scene_;
   RenderOptions options_;
   RayScene wall_;
+  std::vector<Vec3d> vertex_normals_;  // empty without a coat
   PathScene path_scene_;
   Camera<double> camera_;
   Camera<float> fast_camera_;

@@ -89,6 +89,7 @@ std::vector<std::string> NameEffects(const Scene& scene) {
   if (scene.path.bounces > 0) effects.push_back("interreflection");
   if (scene.surface.mottling) effects.push_back("mottling");
   if (scene.surface.vessels) effects.push_back("vessels");
+  if (scene.surface.coat) effects.push_back("coat");
   const auto& sources = scene.calibration.light.sources;
   if (std::any_of(sources.begin(), sources.end(), [](const auto& s) { return !s.position.isZero(0); })) {
     effects.push_back("offset_guides");
@@ -120,9 +121,9 @@ void CheckLightInLumen(const Scene& scene, const std::filesystem::path& file) {
 }  // namespace
 
 const std::vector<std::string>& ExactChannels() {
-  static const std::vector<std::string> channels = {"radiance", "direct",     "indirect", "albedo",
-                                                    "z",        "distance",   "normal",   "position",
-                                                    "flow",     "seen_before"};
+  static const std::vector<std::string> channels = {"radiance", "direct",   "indirect", "glint",
+                                                    "albedo",   "z",        "distance", "normal",
+                                                    "position", "flow",     "seen_before"};
   return channels;
 }
 

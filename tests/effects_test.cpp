@@ -17,8 +17,7 @@ constexpr uint64_t kSeed = 4;
 
 class EffectsTest : public testing::Test {
  protected:
-  fs::path RenderTo(const std::string& name, std::vector<std::string> settings) {
-    settings.push_back("truth.exact=[\"radiance\", \"direct\", \"albedo\", \"z\", \"normal\"]");
+  fs::path RenderTo(const std::string& name, const std::vector<std::string>& settings) {
     const Scene scene = ReadScene(test::WriteScene(scratch_), settings, kSeed);
     Render(scene, {scratch_ / name, 1, 2, kSeed});
     return scratch_ / name;
@@ -39,9 +38,18 @@ class EffectsTest : public testing::Test {
 using Names = std::set<std::string>;
 
 TEST_F(EffectsTest, SensorNoiseChangesThePictureOnly) {
-  const fs::path without = RenderTo("without", {}), with = RenderTo("with", {"sensor.noise.read_e=20"});
-  EXPECT_EQ(Differing(without, with), (Names{"0001_color.png"}));
-  EXPECT_EQ(Differing(without, RenderTo("again", {})), Names{});
+  const std::string exact = "truth.exact=[\"radiance\", \"direct\", \"indirect\", \"albedo\", \"z\"]";
+  const fs::path without = RenderTo("without", {exact});
+  EXPECT_EQ(Differing(without, RenderTo("with", {exact, "sensor.noise.read_e=20"})), Names{"0001_color.png"});
+  EXPECT_EQ(Differing(without, RenderTo("again", {exact})), Names{});
+}
+
+// The gains follow the brighter picture; the wall's texture, geometry and motion are as they were.
+TEST_F(EffectsTest, CoatChangesThePictureOnly) {
+  const std::string exact = "truth.exact=[\"albedo\", \"z\", \"normal\", \"position\", \"flow\"]";
+  const fs::path without = RenderTo("without", {exact});
+  EXPECT_EQ(Differing(without, RenderTo("with", {exact, "surface.coat.roughness=0.3"})),
+            (Names{"0001_color.png", "sequence.toml"}));
 }
 
 }  // namespace

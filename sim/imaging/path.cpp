@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <type_traits>
 
 #include "common/parallel.h"
 #include "sim/imaging/sampler.h"
@@ -36,15 +37,24 @@ struct Source {
   bool at_camera;  // what the camera sees, it lights: no shadow at the first vertex
 };
 
-struct Vertex {
+struct PlainVertex {
   Vec3f point, normal;  // normal: unit, to the side that the ray came from; 0 for a face without area
   Vec3f albedo;         // set for a packet at a time
 };
 
+struct CoatedVertex : CoatedPlace {
+  Vec3f point;
+};
+
 // One frame's tracing. The effects that make a difference inside the loops are its template parameters,
-// resolved once a render: shadows of guides off the camera's place, light from wall to wall.
-template <bool kShadows, bool kBounces>
+// resolved once a render: shadows of guides off the camera's place, light from wall to wall, the coat.
+template <bool kShadows, bool kBounces, bool kCoat>
 class Tracer {
+  using Vertex = std::conditional_t<kCoat, CoatedVertex, PlainVertex>;
+  // Light that leaves a vertex, RGB, a column a lobe: what the wall scatters, and what the coat reflects.
+  static constexpr int kLobes = kCoat ? 2 : 1;
+  using Lobes = Eigen::Matrix<float, 3, kLobes>;
+
  public:
   Tracer(const PathScene& scene, const View& view, const PathOptions& options, uint64_t seed, int frame)
       : scene_(scene), view_(view), options_(options), seed_(seed), frame_(static_cast<uint64_t>(frame)) {
@@ -62,6 +72,7 @@ class Tracer {
     const int width = view_.valid->width, height = view_.valid->height;
     film->radiance = ImageF(width, height, 3);
     if (with_parts) film->direct = film->indirect = film->radiance;
+    if (with_parts && kCoat) film->glint = film->radiance;
     const int block_rows = (height + kBlock - 1) / kBlock;
     std::vector<PathCount> counts(block_rows);
     ParallelFor(0, block_rows, [&](int64_t row) {
@@ -88,7 +99,8 @@ class Tracer {
   struct Lane {
     int x, y;
     bool on;
-    Vec3d direct, indirect;  // sums over samples
+    Eigen::Matrix<double, 3, kLobes> direct;  // sums over samples
+    Vec3d indirect;
     int samples;
   };
 
@@ -99,7 +111,7 @@ class Tracer {
     for (int i = 0; i < RayPacket::kSize; ++i) {
       const int x = x0 + i % kBlock, y = y0 + i / kBlock;
       const bool on = x < width && y < height && *view_.valid->Pixel(x, y) != 0;
-      lanes[i] = {x, y, on, Vec3d::Zero(), Vec3d::Zero(), 0};
+      lanes[i] = {x, y, on, Eigen::Matrix<double, 3, kLobes>::Zero(), Vec3d::Zero(), 0};
       any = any || on;
     }
     if (!any) return;
@@ -109,9 +121,12 @@ class Tracer {
       const double share = 1.0 / lane.samples;
       for (int c = 0; c < 3; ++c) {
         film->radiance.Pixel(lane.x, lane.y)[c] =
-            static_cast<float>(share * (lane.direct[c] + lane.indirect[c]));
+            static_cast<float>(share * (lane.direct.row(c).sum() + lane.indirect[c]));
         if (!with_parts) continue;
-        film->direct.Pixel(lane.x, lane.y)[c] = static_cast<float>(share * lane.direct[c]);
+        film->direct.Pixel(lane.x, lane.y)[c] = static_cast<float>(share * lane.direct(c, 0));
+        if constexpr (kCoat) {
+          film->glint.Pixel(lane.x, lane.y)[c] = static_cast<float>(share * lane.direct(c, 1));
+        }
         film->indirect.Pixel(lane.x, lane.y)[c] = static_cast<float>(share * lane.indirect[c]);
       }
     }
@@ -159,8 +174,9 @@ class Tracer {
                                   Vec3f(rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]));
     }
     SetAlbedos(&wave);
-    Vec3f direct[RayPacket::kSize], indirect[RayPacket::kSize];
-    std::fill_n(direct, RayPacket::kSize, Vec3f(0, 0, 0));
+    Lobes direct[RayPacket::kSize];
+    Vec3f indirect[RayPacket::kSize];
+    std::fill_n(direct, RayPacket::kSize, Lobes(Lobes::Zero()));
     std::fill_n(indirect, RayPacket::kSize, Vec3f(0, 0, 0));
     for (const Source& source : sources_) AddDirect(source, wave, direct, count);
     if constexpr (kBounces) FollowPaths(sample, lanes, &wave, indirect, count);
@@ -171,7 +187,7 @@ class Tracer {
     }
   }
 
-  static void Collect(const Vec3f& direct, const Vec3f& indirect, int sample, Lane* lane, PathCount* count) {
+  static void Collect(const Lobes& direct, const Vec3f& indirect, int sample, Lane* lane, PathCount* count) {
     if (!std::isfinite(direct.sum() + indirect.sum())) {
       Failure& failure = count->failure;
       const bool first = failure.count == 0 || std::pair(lane->y, lane->x) < std::pair(failure.y, failure.x);
@@ -179,7 +195,7 @@ class Tracer {
       ++failure.count;
       return;
     }
-    lane->direct += direct.cast<double>();
+    lane->direct += direct.template cast<double>();
     lane->indirect += indirect.cast<double>();
     ++lane->samples;
   }
@@ -195,7 +211,23 @@ class Tracer {
     const double length = cross.norm();
     vertex.normal = length > 0 ? (cross / length).template cast<float>() : Vec3f(Vec3f::Zero());
     if (vertex.normal.dot(incoming) > 0) vertex.normal = -vertex.normal;
+    if constexpr (kCoat) SetCoat(corners, u, v, incoming, &vertex);
     return vertex;
+  }
+
+  // The coat lies on the smooth wall that the triangles stand for: its lobe is narrower than the angles
+  // between them.
+  void SetCoat(const Vec3i& corners, float u, float v, const Vec3f& incoming, Vertex* vertex) const {
+    const std::vector<Vec3d>& normals = *scene_.vertex_normals;
+    const Vec3d mean = double(1 - u - v) * normals[corners[0]] + double(u) * normals[corners[1]] +
+                       double(v) * normals[corners[2]];
+    const double length = mean.norm();
+    Vec3f smooth = length > 0 ? (mean / length).template cast<float>() : vertex->normal;
+    if (smooth.dot(vertex->normal) < 0) smooth = -smooth;
+    const Coat& coat = *scene_.surface->coat;
+    vertex->outgoing = -incoming;
+    vertex->coat_normal = coat.ReliefNormal(scene_.surface_seed, vertex->point, smooth);
+    vertex->reflectance = coat.Reflectance(vertex->coat_normal.dot(vertex->outgoing));
   }
 
   void SetAlbedos(Wavefront* wave) const {
@@ -210,19 +242,27 @@ class Tracer {
     }
   }
 
-  // Light that comes from a source to a vertex and leaves it in any direction, shadows apart.
-  static Vec3f Reflected(const Source& source, const Vertex& vertex) {
+  // Light that comes from a source to a vertex and leaves it to where its ray came from, shadows apart.
+  Lobes Reflected(const Source& source, const Vertex& vertex) const {
     const Irradiance<float> irradiance =
         IrradianceAt<float>(source.position, source.direction, source.spread, vertex.point);
     const float cosine = vertex.normal.dot(irradiance.toward);
-    if (!(cosine > 0)) return Vec3f::Zero();
-    return (irradiance.per_intensity * cosine) * source.intensity.cwiseProduct(lambert::Eval(vertex.albedo));
+    if (!(cosine > 0)) return Lobes::Zero();
+    if constexpr (kCoat) {
+      const CoatLobes lobes = scene_.surface->coat->Eval(vertex, irradiance.toward);
+      Lobes light;
+      light << source.intensity.cwiseProduct(lobes.base), source.intensity * lobes.glint;
+      return irradiance.per_intensity * light;
+    } else {
+      return (irradiance.per_intensity * cosine) *
+             source.intensity.cwiseProduct(lambert::Eval(vertex.albedo));
+    }
   }
 
-  void AddDirect(const Source& source, const Wavefront& wave, Vec3f* direct, PathCount* count) const {
-    Vec3f light[RayPacket::kSize];
+  void AddDirect(const Source& source, const Wavefront& wave, Lobes* direct, PathCount* count) const {
+    Lobes light[RayPacket::kSize];
     for (int i = 0; i < RayPacket::kSize; ++i) {
-      light[i] = wave.alive[i] ? Reflected(source, wave.vertices[i]) : Vec3f(Vec3f::Zero());
+      light[i] = wave.alive[i] ? Reflected(source, wave.vertices[i]) : Lobes(Lobes::Zero());
     }
     if constexpr (kShadows) {
       if (!source.at_camera) Shade(source, wave.vertices, light, count);
@@ -231,7 +271,7 @@ class Tracer {
   }
 
   // Takes away the light of a packet's vertices that something keeps from them.
-  void Shade(const Source& source, const Vertex* vertices, Vec3f* light, PathCount* count) const {
+  void Shade(const Source& source, const Vertex* vertices, Lobes* light, PathCount* count) const {
     RayPacket shadow;
     for (int i = 0; i < RayPacket::kSize; ++i) {
       const bool lit = !light[i].isZero(0);
@@ -274,14 +314,27 @@ class Tracer {
 
   // Takes a path to its next vertex. False where it ends: by Russian roulette, or without meeting a wall.
   bool Bounce(const Sampler& sampler, int bounce, Vertex* vertex, Vec3f* throughput, PathCount* count) const {
-    // Cosine-distributed directions: BRDF · cos / density is the albedo.
-    *throughput = throughput->cwiseProduct(vertex->albedo);
+    Vec3f direction;
+    if constexpr (kCoat) {
+      const Coat& coat = *scene_.surface->coat;
+      const float choice = sampler.Pair(PairOf(bounce, kRoulettePair))[1];
+      direction = coat.Sample(*vertex, sampler.Pair(PairOf(bounce, kDirectionPair)), choice);
+      if (!(direction.dot(vertex->normal) > 0)) return false;
+      const CoatLobes lobes = coat.Eval(*vertex, direction);
+      *throughput =
+          throughput->cwiseProduct(lobes.base + Vec3f::Constant(lobes.glint)) / coat.Pdf(*vertex, direction);
+    } else {
+      // Cosine-distributed directions: BRDF · cos / density is the albedo.
+      *throughput = throughput->cwiseProduct(vertex->albedo);
+    }
     if (bounce > options_.roulette_after) {
       const float survival = std::min(1.0f, std::sqrt(throughput->maxCoeff()));
       if (sampler.Pair(PairOf(bounce, kRoulettePair))[0] >= survival) return false;
       *throughput /= survival;
     }
-    const Vec3f direction = lambert::Sample(vertex->normal, sampler.Pair(PairOf(bounce, kDirectionPair)));
+    if constexpr (!kCoat) {
+      direction = lambert::Sample(vertex->normal, sampler.Pair(PairOf(bounce, kDirectionPair)));
+    }
     const RayHit hit =
         scene_.wall->Intersect(OffsetOrigin(vertex->point, vertex->normal), direction, 0.0f, kFar);
     ++count->rays;
@@ -303,7 +356,7 @@ class Tracer {
     Vec3f light = Vec3f::Zero();
     float below = 0;
     for (const Source& source : sources_) {
-      const Vec3f candidate = Reflected(source, vertex);
+      const Vec3f candidate = Reflected(source, vertex).rowwise().sum();
       if (candidate.sum() == 0) continue;
       chosen = &source;
       light = candidate;
@@ -325,13 +378,24 @@ class Tracer {
   std::vector<Source> sources_;
 };
 
-template <bool kShadows>
+bool HasShadows(const Light& light) {
+  return std::any_of(light.sources.begin(), light.sources.end(),
+                     [](const LightSource& source) { return !source.position.isZero(0); });
+}
+
+// Resolves what the scene has, one flag after the other.
+template <bool... kFlags>
 PathCount RenderWith(const PathScene& scene, const View& view, const PathOptions& options, uint64_t seed,
                      int frame, bool with_parts, Film* film) {
-  if (options.bounces > 0) {
-    return Tracer<kShadows, true>(scene, view, options, seed, frame).Run(with_parts, film);
+  if constexpr (sizeof...(kFlags) == 3) {
+    return Tracer<kFlags...>(scene, view, options, seed, frame).Run(with_parts, film);
+  } else {
+    const bool on = sizeof...(kFlags) == 0   ? HasShadows(*view.light)
+                    : sizeof...(kFlags) == 1 ? options.bounces > 0
+                                             : scene.surface->coat.has_value();
+    return on ? RenderWith<kFlags..., true>(scene, view, options, seed, frame, with_parts, film)
+              : RenderWith<kFlags..., false>(scene, view, options, seed, frame, with_parts, film);
   }
-  return Tracer<kShadows, false>(scene, view, options, seed, frame).Run(with_parts, film);
 }
 
 }  // namespace
@@ -351,10 +415,7 @@ Vec3f OffsetOrigin(const Vec3f& point, const Vec3f& normal) {
 
 PathCount RenderFrame(const PathScene& scene, const View& view, const PathOptions& options, uint64_t seed,
                       int frame, bool with_parts, Film* film) {
-  const bool shadows = std::any_of(view.light->sources.begin(), view.light->sources.end(),
-                                   [](const LightSource& source) { return !source.position.isZero(0); });
-  return shadows ? RenderWith<true>(scene, view, options, seed, frame, with_parts, film)
-                 : RenderWith<false>(scene, view, options, seed, frame, with_parts, film);
+  return RenderWith<>(scene, view, options, seed, frame, with_parts, film);
 }
 
 }  // namespace lumen

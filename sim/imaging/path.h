@@ -25,6 +25,7 @@ struct PathScene {
   const RayScene* wall;
   const Surface* surface;
   uint64_t surface_seed;
+  const std::vector<Vec3d>* vertex_normals = nullptr;  // VertexNormals of the wall, for a surface with a coat
 };
 
 struct View {
@@ -38,6 +39,7 @@ struct View {
 struct Film {
   ImageF radiance;
   ImageF direct, indirect;
+  ImageF glint;  // of direct light on the coat; empty without one
 };
 
 // A radiance that was not finite: it is left out of its pixel's mean, counted, and the first is named.

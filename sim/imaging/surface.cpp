@@ -119,11 +119,41 @@ Surface ReadSurface(const ConfigTable& table) {
     surface.vessels->width_mm = vessels->Number("width_mm", surface.vessels->width_mm, {1e-4, 1e6});
     surface.vessels->absorption = vessels->Vector("absorption", surface.vessels->absorption, {0, 50});
   }
+  if (const auto coat = table.Optional("coat")) surface.coat.emplace(ReadCoat(*coat));
   return surface;
 }
 
 float GradientNoise(uint64_t seed, const Vec3f& point) {
   return Noise(NoiseSeed(seed), point[0], point[1], point[2]);
+}
+
+Vec3f NoiseGradient(uint64_t seed, const Vec3f& point) {
+  const uint32_t noise_seed = NoiseSeed(seed);
+  const Vec3f floor = point.array().floor(), offset = point - floor;
+  Vec3f weight, weight_slope;
+  for (int d = 0; d < 3; ++d) {
+    const float t = offset[d];
+    weight[d] = Quintic(t);
+    weight_slope[d] = 30 * t * t * (t - 1) * (t - 1);
+  }
+  Vec3f gradient = Vec3f::Zero();
+  for (int corner = 0; corner < 8; ++corner) {
+    const int at[3] = {corner & 1, corner >> 1 & 1, corner >> 2 & 1};
+    const uint32_t hash = LatticeHash(noise_seed, static_cast<int>(floor[0]) + at[0],
+                                      static_cast<int>(floor[1]) + at[1], static_cast<int>(floor[2]) + at[2]);
+    // The lattice point's gradient is that of a linear function, read off at unit steps.
+    const Vec3f slope(GradientDot(hash, 1, 0, 0), GradientDot(hash, 0, 1, 0), GradientDot(hash, 0, 0, 1));
+    const float value = slope.dot(offset - Vec3f(float(at[0]), float(at[1]), float(at[2])));
+    Vec3f share, share_slope;
+    for (int d = 0; d < 3; ++d) {
+      share[d] = at[d] ? weight[d] : 1 - weight[d];
+      share_slope[d] = at[d] ? weight_slope[d] : -weight_slope[d];
+    }
+    gradient += share.prod() * slope + value * Vec3f(share_slope[0] * share[1] * share[2],
+                                                     share[0] * share_slope[1] * share[2],
+                                                     share[0] * share[1] * share_slope[2]);
+  }
+  return gradient;
 }
 
 Vec3f AlbedoAt(const Surface& surface, uint64_t seed, const Vec3f& place_mm) {
@@ -137,20 +167,23 @@ void AlbedoAt(const Surface& surface, uint64_t seed, const Lanes3& place_mm, Lan
   Albedos<Lanes3::kSize>(surface, seed, place_mm.c, albedo->c);
 }
 
+TangentFrame::TangentFrame(const Vec3f& normal) {
+  const float sign = std::copysign(1.0f, normal[2]);
+  const float a = -1 / (sign + normal[2]), b = normal[0] * normal[1] * a;
+  tangent = Vec3f(1 + sign * normal[0] * normal[0] * a, sign * b, -sign * normal[0]);
+  bitangent = Vec3f(b, sign + normal[1] * normal[1] * a, -normal[1]);
+}
+
 namespace lambert {
 
 Vec3f Sample(const Vec3f& normal, const Vec2f& random) {
-  // A point on the unit disc, lifted to the hemisphere (Malley), in a frame about the normal (Duff et al.
-  // 2017, "Building an orthonormal basis, revisited").
+  // A point on the unit disc, lifted to the hemisphere (Malley).
   const float radius = std::sqrt(random[0]);
   const float angle = static_cast<float>(2 * kPi) * random[1];
   const float x = radius * std::cos(angle), y = radius * std::sin(angle);
   const float z = std::sqrt(std::max(0.0f, 1 - random[0]));
-  const float sign = std::copysign(1.0f, normal[2]);
-  const float a = -1 / (sign + normal[2]), b = normal[0] * normal[1] * a;
-  const Vec3f tangent(1 + sign * normal[0] * normal[0] * a, sign * b, -sign * normal[0]);
-  const Vec3f bitangent(b, sign + normal[1] * normal[1] * a, -normal[1]);
-  return x * tangent + y * bitangent + z * normal;
+  const TangentFrame frame(normal);
+  return x * frame.tangent + y * frame.bitangent + z * normal;
 }
 
 }  // namespace lambert

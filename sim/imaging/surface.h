@@ -1,5 +1,5 @@
 // What the mucosa does with light: a Lambertian wall whose albedo is a solid texture of place, with blood
-// vessels.
+// vessels, under a coat of mucus if there is one (coat.h).
 #pragma once
 
 #include <cstdint>
@@ -8,6 +8,7 @@
 #include "common/config.h"
 #include "common/math.h"
 #include "common/random.h"
+#include "sim/imaging/coat.h"
 
 namespace lumen {
 
@@ -28,6 +29,7 @@ struct Surface {
   Vec3d albedo = Vec3d(0.80, 0.35, 0.30);
   std::optional<Mottling> mottling;
   std::optional<Vessels> vessels;
+  std::optional<Coat> coat;
 };
 
 // Reads the scene's [surface].
@@ -36,6 +38,12 @@ Surface ReadSurface(const ConfigTable& surface);
 // Smooth noise in ±1 at a point, period-free, a function of seed (Perlin 2002: gradients at the integer
 // lattice, quintic interpolation).
 float GradientNoise(uint64_t seed, const Vec3f& point);
+// Its gradient.
+Vec3f NoiseGradient(uint64_t seed, const Vec3f& point);
+
+// The noise fields of a surface have seeds of their own: mottling the surface's seed and the next, vessels
+// the two after, then the coat's relief two.
+inline constexpr uint64_t kReliefSeeds = 4;
 
 // Three numbers in each of a packet's lanes: places or albedos.
 struct alignas(64) Lanes3 {
@@ -49,6 +57,13 @@ struct alignas(64) Lanes3 {
 Vec3f AlbedoAt(const Surface& surface, uint64_t seed, const Vec3f& place_mm);
 // The same in sixteen places at once, lane for lane the same bits.
 void AlbedoAt(const Surface& surface, uint64_t seed, const Lanes3& place_mm, Lanes3* albedo);
+
+// Two directions that with a unit normal make right-handed axes (Duff et al. 2017, "Building an orthonormal
+// basis, revisited").
+struct TangentFrame {
+  explicit TangentFrame(const Vec3f& normal);
+  Vec3f tangent, bitangent;
+};
 
 // Lambert's lobe as the triple eval / sample / pdf. Directions point away from the surface, cosines are to
 // its normal. The BRDF is albedo/π.

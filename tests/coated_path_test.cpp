@@ -1,0 +1,226 @@
+// The path tracer on a wall with a coat of mucus.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "common/mesh.h"
+#include "common/parallel.h"
+#include "common/random.h"
+#include "sim/imaging/path.h"
+
+namespace lumen {
+namespace {
+
+constexpr double kRadius_mm = 20;
+const Vec3d kEye(3, -2, 4);
+const Vec3d kGuide(3, 0.5, -0.2);  // from the eye
+constexpr double kSpread = 1.5;
+constexpr double kIntensity = 500;
+
+Mesh Sphere(int rings) {
+  Mesh mesh;
+  for (int i = 0; i <= rings; ++i) {
+    for (int j = 0; j < 2 * rings; ++j) {
+      const double polar = kPi * i / rings, turn = kPi * j / rings;
+      mesh.vertices.push_back(kRadius_mm * Vec3d(std::sin(polar) * std::cos(turn),
+                                                 std::sin(polar) * std::sin(turn), std::cos(polar)));
+    }
+  }
+  for (int i = 0; i < rings; ++i) {
+    for (int j = 0; j < 2 * rings; ++j) {
+      const int a = i * 2 * rings + j, b = i * 2 * rings + (j + 1) % (2 * rings);
+      mesh.faces.push_back({a, b, a + 2 * rings});
+      mesh.faces.push_back({b, b + 2 * rings, a + 2 * rings});
+    }
+  }
+  return mesh;
+}
+
+// A camera inside a coated sphere.
+struct Stage {
+  Mesh mesh = Sphere(100);
+  RayScene wall{mesh};
+  std::vector<Vec3d> normals = VertexNormals(mesh);
+  Surface surface;
+  CameraIntrinsics intrinsics;
+  Light light;
+  Pose world_from_camera = Pose::Identity();
+  PathOptions options;
+
+  Stage(int width, int height, double focal_px) {
+    intrinsics.width = width;
+    intrinsics.height = height;
+    intrinsics.fx = intrinsics.fy = focal_px;
+    intrinsics.cx = (width - 1) / 2.0;
+    intrinsics.cy = (height - 1) / 2.0;
+    light.sources.push_back({kGuide, Vec3d::UnitZ(), kSpread, Vec3d::Constant(kIntensity)});
+    world_from_camera.translation() = kEye;
+    options.samples = 1;
+  }
+  Film Render(bool with_parts = true) const {
+    const Camera<float> camera(intrinsics);
+    const Image8 valid(intrinsics.width, intrinsics.height, 1, 255);
+    Film film;
+    const PathCount count =
+        RenderFrame({&wall, &surface, 0, &normals}, {&camera, &valid, world_from_camera, &light}, options, 1,
+                    0, with_parts, &film);
+    EXPECT_EQ(count.failure.count, 0);
+    return film;
+  }
+};
+
+Vec3d OnSphere(const Vec3d& from, const Vec3d& direction) {
+  const double b = from.dot(direction);
+  return from + (-b + std::sqrt(b * b + kRadius_mm * kRadius_mm - from.squaredNorm())) * direction;
+}
+
+CoatedPlace PlaceOnSphere(const Coat& coat, const Vec3d& point, const Vec3d& toward, const Vec3f& albedo) {
+  const Vec3f normal = (-point / kRadius_mm).cast<float>();
+  const Vec3f outgoing = (toward - point).normalized().cast<float>();
+  return {normal, albedo, outgoing, normal, coat.Reflectance(normal.dot(outgoing))};
+}
+
+// What a place sends on of the guide's light.
+CoatLobes DirectLobes(const Coat& coat, const CoatedPlace& place, const Vec3d& point) {
+  const Vec3d to_guide = kEye + kGuide - point, toward = to_guide.normalized();
+  const double fall = kIntensity * std::exp(-kSpread * (1 + toward.z())) / to_guide.squaredNorm();
+  const CoatLobes lobes = coat.Eval(place, toward.cast<float>());
+  return {float(fall) * lobes.base, float(fall) * lobes.glint};
+}
+
+// On the smooth sphere, triangles apart: some 1e-3 where the lobe is wide.
+TEST(CoatedPath, DirectLightAndGlintAreTheLobes) {
+  Stage stage(41, 31, 20);
+  stage.surface.coat.emplace(CoatOptions{1.37, 0.6, 1, 0});
+  const Film film = stage.Render();
+  double base_error = 0, base_sum = 0, glint_error = 0, glint_sum = 0;
+  for (int y = 0; y < 31; ++y) {
+    for (int x = 0; x < 41; ++x) {
+      const Vec3d ray = Vec3d((x - 20) / 20.0, (y - 15) / 20.0, 1).normalized();
+      const Vec3d point = OnSphere(kEye, ray);
+      const CoatedPlace place =
+          PlaceOnSphere(*stage.surface.coat, point, kEye, stage.surface.albedo.cast<float>());
+      const CoatLobes expected = DirectLobes(*stage.surface.coat, place, point);
+      base_error += std::abs(film.direct.Pixel(x, y)[0] - expected.base[0]);
+      glint_error += std::abs(film.glint.Pixel(x, y)[0] - expected.glint);
+      base_sum += expected.base[0];
+      glint_sum += expected.glint;
+      EXPECT_EQ(film.glint.Pixel(x, y)[0], film.glint.Pixel(x, y)[2]);  // as colourless as the light
+    }
+  }
+  EXPECT_LT(base_error, 0.02 * base_sum);
+  EXPECT_LT(glint_error, 0.02 * glint_sum);
+  EXPECT_GT(glint_sum, 0.02 * base_sum);
+}
+
+// The parts are rounded to float one by one.
+TEST(CoatedPath, PartsAddUp) {
+  Stage stage(24, 18, 12);
+  stage.surface.coat.emplace(CoatOptions{});
+  stage.options.samples = 4;
+  stage.options.bounces = 3;
+  const Film film = stage.Render(), whole = stage.Render(false);
+  int with_glint = 0;
+  for (size_t i = 0; i < film.radiance.data.size(); ++i) {
+    const double sum = double(film.direct.data[i]) + film.indirect.data[i] + film.glint.data[i];
+    EXPECT_NEAR(film.radiance.data[i], sum, 2e-7 * sum);
+    with_glint += film.glint.data[i] > 0.01 * film.radiance.data[i];
+  }
+  EXPECT_GT(with_glint, 10);
+  EXPECT_EQ(film.radiance.data, whole.radiance.data);
+  EXPECT_TRUE(whole.glint.empty() && whole.direct.empty());
+}
+
+// One bounce against uniform directions at the first place, on the smooth sphere: Z-test of two independent
+// estimates, with 0.5% for the triangles.
+TEST(CoatedPath, BounceIsTheIntegralOverTheHemisphere) {
+  Stage stage(1, 1, 1);
+  stage.world_from_camera.linear() = Eigen::AngleAxisd(0.9, Vec3d::UnitY()).toRotationMatrix();
+  stage.surface.coat.emplace(CoatOptions{2, 0.6, 1, 0});  // a strong coat
+  stage.options.bounces = 1;
+  const Coat& coat = *stage.surface.coat;
+  const Vec3f albedo = stage.surface.albedo.cast<float>();
+  const Vec3d first = OnSphere(kEye, stage.world_from_camera.linear().col(2));
+  const CoatedPlace place = PlaceOnSphere(coat, first, kEye, albedo);
+  const Vec3d axis = stage.world_from_camera.linear().col(2);
+  const auto direct = [&](const CoatedPlace& at, const Vec3d& point) {
+    const Vec3d to_guide = stage.world_from_camera * kGuide - point, toward = to_guide.normalized();
+    const double fall = kIntensity * std::exp(-kSpread * (1 + toward.dot(axis))) / to_guide.squaredNorm();
+    const CoatLobes lobes = coat.Eval(at, toward.cast<float>());
+    return std::pair(fall * lobes.base[1], fall * (lobes.base[1] + lobes.glint));
+  };
+  const int count = 400000;
+  double sum = 0, squares = 0, without_glints = 0;
+  for (int i = 0; i < count; ++i) {
+    const double z = 2 * UniformDouble(RandomBits(1, i, 0)) - 1,
+                 turn = 2 * kPi * UniformDouble(RandomBits(1, i, 1));
+    const double sine = std::sqrt(1 - z * z);
+    Vec3d direction(sine * std::cos(turn), sine * std::sin(turn), z);
+    if (direction.dot(first) > 0) direction = -direction;
+    const Vec3d second = OnSphere(first, direction);
+    const CoatLobes lobes = coat.Eval(place, direction.cast<float>());
+    const auto [base, whole] = direct(PlaceOnSphere(coat, second, first, albedo), second);
+    const double value = 2 * kPi * (lobes.base[1] + lobes.glint) * whole;
+    sum += value / count;
+    squares += value * value / count;
+    without_glints += 2 * kPi * lobes.base[1] * base / count;
+  }
+  const double error = std::sqrt((squares - sum * sum) / count);
+  stage.options.samples = 1 << 16;
+  // The pixel is as narrow as a ray.
+  stage.intrinsics.fx = stage.intrinsics.fy = 1e4;
+  const double found = stage.Render().indirect.Pixel(0, 0)[1];
+  // The tracer's samples vary no more than the uniform ones.
+  EXPECT_NEAR(found, sum, 5 * error * std::sqrt(1 + double(count) / (1 << 16)) + 0.005 * sum);
+  EXPECT_GT(std::abs(found - without_glints), 0.1 * sum);
+}
+
+// An index of refraction of 1 reflects nothing: the Lambertian wall's radiance, from the same random numbers.
+TEST(CoatedPath, CoatOfAirIsNone) {
+  Stage stage(16, 12, 8);
+  stage.options.samples = 4;
+  stage.options.bounces = 4;
+  const Film bare = stage.Render();
+  stage.surface.coat.emplace(CoatOptions{1, 0.3, 0.5, 0.05});
+  const Film air = stage.Render();
+  for (size_t i = 0; i < bare.radiance.data.size(); ++i) {
+    EXPECT_NEAR(air.direct.data[i], bare.direct.data[i], 1e-5 * bare.direct.data[i]);
+    EXPECT_NEAR(air.indirect.data[i], bare.indirect.data[i], 1e-4 * bare.indirect.data[i]);
+    EXPECT_EQ(air.glint.data[i], 0);
+  }
+  EXPECT_TRUE(bare.glint.empty());
+}
+
+// The hardest view: a mirror lit from the camera itself, seen along its normal.
+TEST(CoatedPath, MirrorLitFromTheCameraStaysFinite) {
+  Stage stage(9, 9, 400);
+  stage.light.sources[0].position = Vec3d::Zero();
+  stage.world_from_camera.translation() = Vec3d(5, 0, 0);  // to +x, away from the mesh's poles
+  stage.world_from_camera.linear() = Eigen::AngleAxisd(kPi / 2, Vec3d::UnitY()).toRotationMatrix();
+  stage.surface.coat.emplace(CoatOptions{1.37, 0, 1, 0});
+  stage.options.bounces = 4;
+  stage.options.samples = 16;
+  const Film film = stage.Render();
+  float most = 0;
+  for (const float value : film.radiance.data) {
+    EXPECT_TRUE(std::isfinite(value));
+    most = std::max(most, value);
+  }
+  EXPECT_GT(most, 10);
+}
+
+TEST(CoatedPath, SameBytesForAnyNumberOfThreads) {
+  Stage stage(20, 20, 12);
+  stage.surface.coat.emplace(CoatOptions{});
+  stage.options.bounces = 3;
+  SetThreadCount(1);
+  const Film one = stage.Render();
+  SetThreadCount(2);
+  const Film two = stage.Render();
+  SetThreadCount(0);
+  EXPECT_EQ(one.radiance.data, two.radiance.data);
+  EXPECT_EQ(one.glint.data, two.glint.data);
+}
+
+}  // namespace
+}  // namespace lumen
