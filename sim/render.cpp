@@ -6,6 +6,7 @@
 
 #include "common/error.h"
 #include "common/files.h"
+#include "common/jpeg.h"
 #include "common/parallel.h"
 #include "common/progress.h"
 #include "sim/ground_truth.h"
@@ -111,7 +112,8 @@ class Renderer {
     result_.samples += count.samples;
     result_.rays += count.rays;
     NoteFailure(frame, count.failure);
-    WriteImage(FrameFile(options_.folder, frame, "color.png"), Photograph(frame, gain, film, vignetting));
+    WriteImage(FrameFile(options_.folder, frame, "color.png"),
+               Photograph(frame, gain, film.radiance, vignetting));
     if (scene_.truth.c3vd || !scene_.truth.exact.empty()) {
       const Pose* previous = frame > 0 ? &scene_.world_from_camera[frame - 1] : nullptr;
       const FrameTruth truth =
@@ -121,12 +123,24 @@ class Renderer {
     }
   }
 
-  // What the sensor makes of a frame.
-  Image8 Photograph(int frame, double gain, const Film& film, const ImageF& vignetting) const {
+  // What lens, sensor and recorder make of a frame.
+  Image8 Photograph(int frame, double gain, const ImageF& radiance, const ImageF& vignetting) const {
+    if (!scene_.chromatic_aberration) return Record(frame, gain, radiance, vignetting);
+    const ImageF dispersed =
+        Disperse(*scene_.chromatic_aberration, scene_.calibration.camera, radiance, valid_);
+    return Record(frame, gain, dispersed, vignetting);
+  }
+
+  Image8 Record(int frame, double gain, const ImageF& radiance, const ImageF& vignetting) const {
+    const Image8 developed = Expose(frame, gain, radiance, vignetting);
+    return scene_.sensor.jpeg ? ThroughJpeg(developed, scene_.sensor.jpeg->quality) : developed;
+  }
+
+  Image8 Expose(int frame, double gain, const ImageF& radiance, const ImageF& vignetting) const {
     const Response& response = scene_.calibration.response;
-    if (!scene_.sensor.noise) return Develop(response, gain, film.radiance, vignetting, valid_);
+    if (!scene_.sensor.noise) return Develop(response, gain, radiance, vignetting, valid_);
     const ImageF signal =
-        Expose(*scene_.sensor.noise, film.radiance, vignetting, valid_, options_.seed, frame);
+        NoisySignal(*scene_.sensor.noise, radiance, vignetting, valid_, options_.seed, frame);
     const ImageF no_more_vignetting(signal.width, signal.height, 1, 1.0f);
     return Develop(response, gain, signal, no_more_vignetting, valid_);
   }

@@ -95,8 +95,10 @@ std::vector<std::string> NameEffects(const Scene& scene) {
     effects.push_back("offset_guides");
   }
   if (scene.calibration.response.vignetting > 0) effects.push_back("vignetting");
+  if (scene.chromatic_aberration) effects.push_back("chromatic_aberration");
   if (scene.sensor.auto_gain) effects.push_back("auto_gain");
   if (scene.sensor.noise) effects.push_back("sensor_noise");
+  if (scene.sensor.jpeg) effects.push_back("jpeg");
   if (!scene.calibration.mask.empty()) effects.push_back("mask");
   return effects;
 }
@@ -138,6 +140,11 @@ Scene ReadScene(const std::filesystem::path& file, const std::vector<std::string
   scene.calibration.response = ReadResponse(root.Table("response"));
   scene.surface = ReadSurface(root.Table("surface"));
   if (const auto path = root.Optional("path")) scene.path = ReadPath(*path);
+  if (const auto lens = root.Optional("lens")) {
+    if (const auto table = lens->Optional("chromatic_aberration")) {
+      scene.chromatic_aberration = ReadChromaticAberration(*table);
+    }
+  }
   if (const auto sensor = root.Optional("sensor")) scene.sensor = ReadSensor(*sensor);
   if (const auto truth = root.Optional("truth")) scene.truth = ReadTruth(*truth);
   scene.geometry = BuildGeometry(root.Table("geometry"), RandomBits(seed, kGeometrySeed));

@@ -2,11 +2,13 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/sequence.h"
 #include "sim/geometry/geometry.h"
+#include "sim/imaging/chromatic_aberration.h"
 #include "sim/imaging/path.h"
 #include "sim/imaging/sensor.h"
 #include "sim/imaging/surface.h"
@@ -24,6 +26,7 @@ struct Scene {
   std::vector<Pose> world_from_camera;
   Surface surface;
   PathOptions path;
+  std::optional<ChromaticAberration> chromatic_aberration;
   Sensor sensor;
   TruthOptions truth;
   std::vector<std::string> effects;  // that the scene names, for reports

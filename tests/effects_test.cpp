@@ -52,5 +52,13 @@ TEST_F(EffectsTest, CoatChangesThePictureOnly) {
             (Names{"0001_color.png", "sequence.toml"}));
 }
 
+TEST_F(EffectsTest, LensAndRecorderChangeThePictureOnly) {
+  const std::string exact = "truth.exact=[\"radiance\", \"direct\", \"indirect\", \"albedo\", \"z\"]";
+  const fs::path without = RenderTo("without", {exact});
+  for (const std::string setting : {"lens.chromatic_aberration.red=0.01", "sensor.jpeg.quality=50"}) {
+    EXPECT_EQ(Differing(without, RenderTo("with", {exact, setting})), Names{"0001_color.png"}) << setting;
+  }
+}
+
 }  // namespace
 }  // namespace lumen

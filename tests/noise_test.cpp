@@ -88,7 +88,7 @@ TEST(Noise, FrameHasTheMeanAndVarianceOfItsPhotons) {
   ImageF image(side, side, 3);
   for (size_t i = 0; i < image.data.size(); ++i) image.data[i] = static_cast<float>(radiance[i % 3]);
   const ImageF signal =
-      Expose(noise, image, ImageF(side, side, 1, float(falloff)), Image8(side, side, 1, 255), 3, 4);
+      NoisySignal(noise, image, ImageF(side, side, 1, float(falloff)), Image8(side, side, 1, 255), 3, 4);
   for (int c = 0; c < 3; ++c) {
     const double mean = falloff * radiance[c], count = double(side) * side;
     const double variance = mean / noise.full_scale_e + std::pow(noise.read_e / noise.full_scale_e, 2);
@@ -99,7 +99,7 @@ TEST(Noise, FrameHasTheMeanAndVarianceOfItsPhotons) {
   }
   // Neighbours, channels and frames are uncorrelated: |r| √n is normal.
   const ImageF other =
-      Expose(noise, image, ImageF(side, side, 1, float(falloff)), Image8(side, side, 1, 255), 3, 5);
+      NoisySignal(noise, image, ImageF(side, side, 1, float(falloff)), Image8(side, side, 1, 255), 3, 5);
   const Moments first = MomentsOf(signal, 0), second = MomentsOf(signal, 1), later = MomentsOf(other, 0);
   double neighbours = 0, channels = 0, frames = 0, itself = 0;
   for (size_t i = 0; i + 3 < signal.data.size(); i += 3) {
@@ -122,7 +122,7 @@ TEST(Noise, GainAmplifiesNoise) {
   const ImageF flat(side, side, 1, 1.0f);
   const Image8 all(side, side, 1, 255);
   const auto spread = [&](float radiance, double gain) {
-    const ImageF signal = Expose(noise, ImageF(side, side, 3, radiance), flat, all, 8, 0);
+    const ImageF signal = NoisySignal(noise, ImageF(side, side, 3, radiance), flat, all, 8, 0);
     const Image8 image = Develop(linear, gain, signal, flat, all);
     ImageF levels(side, side, 3);
     for (size_t i = 0; i < levels.data.size(); ++i) levels.data[i] = image.data[i];
@@ -145,12 +145,12 @@ TEST(Noise, IsTheSameForAnyNumberOfThreadsAndLeavesInvalidPixelsBlack) {
   Image8 valid(40, 30, 1, 255);
   *valid.Pixel(7, 5) = 0;
   SetThreadCount(1);
-  const ImageF one = Expose({}, image, flat, valid, 1, 0);
+  const ImageF one = NoisySignal({}, image, flat, valid, 1, 0);
   SetThreadCount(2);
-  const ImageF two = Expose({}, image, flat, valid, 1, 0);
+  const ImageF two = NoisySignal({}, image, flat, valid, 1, 0);
   SetThreadCount(0);
   EXPECT_EQ(one.data, two.data);
-  EXPECT_NE(one.data, Expose({}, image, flat, valid, 2, 0).data);
+  EXPECT_NE(one.data, NoisySignal({}, image, flat, valid, 2, 0).data);
   for (int c = 0; c < 3; ++c) EXPECT_EQ(one.Pixel(7, 5)[c], 0);
 }
 

@@ -80,8 +80,8 @@ double PoissonNumber(double mean, uint64_t key) {
   return mean + std::sqrt(mean) * NormalNumber(key);
 }
 
-ImageF Expose(const SensorNoise& noise, const ImageF& radiance, const ImageF& vignetting, const Image8& valid,
-              uint64_t seed, int frame) {
+ImageF NoisySignal(const SensorNoise& noise, const ImageF& radiance, const ImageF& vignetting,
+                   const Image8& valid, uint64_t seed, int frame) {
   const uint64_t frame_key = RandomBits(seed, kNoiseSeed, static_cast<uint64_t>(frame));
   ImageF signal(radiance.width, radiance.height, 3);
   ParallelFor(0, radiance.height, [&](int64_t row) {

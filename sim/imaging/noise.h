@@ -32,8 +32,8 @@ SensorNoise ReadSensorNoise(const ConfigTable& noise);
 
 // What the sensor reads of a frame's linear radiance, vignetting included, in parts of full scale at gain 1;
 // it may fall below 0. Pixels that aren't valid stay 0. A function of (seed, frame, pixel, channel).
-ImageF Expose(const SensorNoise& noise, const ImageF& radiance, const ImageF& vignetting, const Image8& valid,
-              uint64_t seed, int frame);
+ImageF NoisySignal(const SensorNoise& noise, const ImageF& radiance, const ImageF& vignetting,
+                   const Image8& valid, uint64_t seed, int frame);
 
 // A number with Poisson's distribution of this mean (>= 0), a function of key.
 double PoissonNumber(double mean, uint64_t key);

@@ -9,6 +9,7 @@
 #include "common/config.h"
 #include "common/image.h"
 #include "common/response.h"
+#include "sim/imaging/jpeg.h"
 #include "sim/imaging/noise.h"
 
 namespace lumen {
@@ -26,6 +27,7 @@ struct Sensor {
   double gain = 1;
   std::optional<AutoGain> auto_gain;  // then `gain` doesn't count
   std::optional<SensorNoise> noise;
+  std::optional<Jpeg> jpeg;
   bool record_gain = true;  // false: sequence.toml leaves the gains out
 };
 
