@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 #include <regex>
 
 #include "common/error.h"
@@ -71,7 +72,7 @@ class Renderer {
   bool WantsParts() const { return Wants("direct") || Wants("indirect") || Wants("glint"); }
 
   View ViewOf(int frame, const Camera<float>& camera, const Image8& valid) const {
-    return {&camera, &valid, scene_.world_from_camera[frame], &scene_.calibration.light};
+    return {&camera, &valid, scene_.world_from_camera[frame], &scene_.calibration.light, nullptr};
   }
 
   std::vector<double> Gains() const {
@@ -104,9 +105,14 @@ class Renderer {
   }
 
   void RenderOne(int frame, double gain, const ImageF& vignetting) {
+    View view = ViewOf(frame, fast_camera_, valid_);
+    std::optional<CameraMotion> motion;
+    if (scene_.sensor.shutter) {
+      view.motion = &motion.emplace(*scene_.sensor.shutter, scene_.world_from_camera, frame);
+    }
     Film film;
-    const PathCount count = RenderFrame(path_scene_, ViewOf(frame, fast_camera_, valid_), scene_.path,
-                                        options_.seed, frame, WantsParts(), &film);
+    const PathCount count =
+        RenderFrame(path_scene_, view, scene_.path, options_.seed, frame, WantsParts(), &film);
     // Without a coat there is no glint.
     if (Wants("glint") && film.glint.empty()) film.glint = ImageF(valid_.width, valid_.height, 3);
     result_.samples += count.samples;

@@ -96,6 +96,7 @@ std::vector<std::string> NameEffects(const Scene& scene) {
   }
   if (scene.calibration.response.vignetting > 0) effects.push_back("vignetting");
   if (scene.chromatic_aberration) effects.push_back("chromatic_aberration");
+  if (scene.sensor.shutter) effects.push_back("shutter");
   if (scene.sensor.auto_gain) effects.push_back("auto_gain");
   if (scene.sensor.noise) effects.push_back("sensor_noise");
   if (scene.sensor.jpeg) effects.push_back("jpeg");

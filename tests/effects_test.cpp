@@ -52,6 +52,15 @@ TEST_F(EffectsTest, CoatChangesThePictureOnly) {
             (Names{"0001_color.png", "sequence.toml"}));
 }
 
+// Truth is that of the frame's moment.
+TEST_F(EffectsTest, ShutterChangesThePictureOnly) {
+  const std::string exact = "truth.exact=[\"albedo\", \"z\", \"flow\"]";
+  const fs::path without = RenderTo("without", {exact});
+  EXPECT_EQ(Differing(without, RenderTo("with", {exact, "sensor.shutter.exposure=0.9"})),
+            Names{"0001_color.png"});
+  EXPECT_EQ(Differing(without, RenderTo("instant", {exact, "sensor.shutter.exposure=0"})), Names{});
+}
+
 TEST_F(EffectsTest, LensAndRecorderChangeThePictureOnly) {
   const std::string exact = "truth.exact=[\"radiance\", \"direct\", \"indirect\", \"albedo\", \"z\"]";
   const fs::path without = RenderTo("without", {exact});

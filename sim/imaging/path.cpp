@@ -22,7 +22,8 @@ enum : uint32_t {
   kDirectionPair = 1,
   kRoulettePair = 2,
   kGuidePair = 3,
-  kPairsPerBounce = 3
+  kPairsPerBounce = 3,
+  kTimePair = 0xffffffffu  // beyond any bounce's
 };
 
 // bounce: from 1.
@@ -35,6 +36,13 @@ struct Source {
   float spread;
   Vec3f intensity;
   bool at_camera;  // what the camera sees, it lights: no shadow at the first vertex
+};
+
+// The camera and its guides at a moment.
+struct Eye {
+  Vec3f origin;
+  Mat3<float> rotation;
+  std::vector<Source> sources;
 };
 
 struct PlainVertex {
@@ -58,14 +66,7 @@ class Tracer {
  public:
   Tracer(const PathScene& scene, const View& view, const PathOptions& options, uint64_t seed, int frame)
       : scene_(scene), view_(view), options_(options), seed_(seed), frame_(static_cast<uint64_t>(frame)) {
-    origin_ = scene.wall->ToLocal(view.world_from_camera.translation());
-    rotation_ = view.world_from_camera.linear().cast<float>();
-    for (const LightSource& source : view.light->sources) {
-      sources_.push_back({scene.wall->ToLocal(view.world_from_camera * source.position),
-                          (view.world_from_camera.linear() * source.direction).cast<float>(),
-                          static_cast<float>(source.spread), source.intensity.cast<float>(),
-                          source.position.isZero(0)});
-    }
+    PlaceEye(view.world_from_camera, &eye_);
   }
 
   PathCount Run(bool with_parts, Film* film) const {
@@ -96,6 +97,18 @@ class Tracer {
   }
 
  private:
+  void PlaceEye(const Pose& world_from_camera, Eye* eye) const {
+    eye->origin = scene_.wall->ToLocal(world_from_camera.translation());
+    eye->rotation = world_from_camera.linear().cast<float>();
+    eye->sources.clear();
+    for (const LightSource& source : view_.light->sources) {
+      eye->sources.push_back({scene_.wall->ToLocal(world_from_camera * source.position),
+                              (world_from_camera.linear() * source.direction).cast<float>(),
+                              static_cast<float>(source.spread), source.intensity.cast<float>(),
+                              source.position.isZero(0)});
+    }
+  }
+
   struct Lane {
     int x, y;
     bool on;
@@ -115,7 +128,7 @@ class Tracer {
       any = any || on;
     }
     if (!any) return;
-    for (int sample = 0; sample < options_.samples; ++sample) TraceSample(sample, lanes, count);
+    TraceSamples(lanes, count);
     for (const Lane& lane : lanes) {
       if (!lane.on || lane.samples == 0) continue;
       const double share = 1.0 / lane.samples;
@@ -129,6 +142,20 @@ class Tracer {
         }
         film->indirect.Pixel(lane.x, lane.y)[c] = static_cast<float>(share * lane.indirect[c]);
       }
+    }
+  }
+
+  void TraceSamples(Lane* lanes, PathCount* count) const {
+    if (!view_.motion) {
+      for (int sample = 0; sample < options_.samples; ++sample) TraceSample(eye_, sample, lanes, count);
+      return;
+    }
+    Eye eye;
+    const double row = (lanes[0].y + kBlock / 2) / double(view_.valid->height);
+    for (int sample = 0; sample < options_.samples; ++sample) {
+      const double time = view_.motion->Time(row, SamplerOf(lanes[0], sample).Pair(kTimePair)[0]);
+      PlaceEye(view_.motion->At(time), &eye);
+      TraceSample(eye, sample, lanes, count);
     }
   }
 
@@ -147,7 +174,7 @@ class Tracer {
   }
 
   // One sample of each of a block's pixels.
-  void TraceSample(int sample, Lane* lanes, PathCount* count) const {
+  void TraceSample(const Eye& eye, int sample, Lane* lanes, PathCount* count) const {
     RayPacket rays;
     for (int i = 0; i < RayPacket::kSize; ++i) {
       Vec2f pixel(static_cast<float>(lanes[i].x), static_cast<float>(lanes[i].y));
@@ -155,9 +182,9 @@ class Tracer {
         pixel += SamplerOf(lanes[i], sample).Pair(kPixelPair) - Vec2f(0.5f, 0.5f);
       }
       const auto ray = lanes[i].on ? view_.camera->Unproject(pixel) : std::nullopt;
-      const Vec3f direction = ray ? Vec3f(rotation_ * *ray) : Vec3f(0, 0, 1);
+      const Vec3f direction = ray ? Vec3f(eye.rotation * *ray) : Vec3f(0, 0, 1);
       for (int d = 0; d < 3; ++d) {
-        rays.origin[d][i] = origin_[d];
+        rays.origin[d][i] = eye.origin[d];
         rays.direction[d][i] = direction[d];
       }
       rays.tnear[i] = 0;
@@ -178,8 +205,8 @@ class Tracer {
     Vec3f indirect[RayPacket::kSize];
     std::fill_n(direct, RayPacket::kSize, Lobes(Lobes::Zero()));
     std::fill_n(indirect, RayPacket::kSize, Vec3f(0, 0, 0));
-    for (const Source& source : sources_) AddDirect(source, wave, direct, count);
-    if constexpr (kBounces) FollowPaths(sample, lanes, &wave, indirect, count);
+    for (const Source& source : eye.sources) AddDirect(source, wave, direct, count);
+    if constexpr (kBounces) FollowPaths(eye, sample, lanes, &wave, indirect, count);
     for (int i = 0; i < RayPacket::kSize; ++i) {
       if (!lanes[i].on) continue;
       ++count->samples;
@@ -292,7 +319,8 @@ class Tracer {
   }
 
   // The path loop: from the first vertices on, what comes to them by way of other places.
-  void FollowPaths(int sample, const Lane* lanes, Wavefront* wave, Vec3f* radiance, PathCount* count) const {
+  void FollowPaths(const Eye& eye, int sample, const Lane* lanes, Wavefront* wave, Vec3f* radiance,
+                   PathCount* count) const {
     std::fill_n(wave->throughput, RayPacket::kSize, Vec3f(1, 1, 1));
     for (int bounce = 1; bounce <= options_.bounces; ++bounce) {
       bool any = false;
@@ -307,7 +335,8 @@ class Tracer {
       for (int i = 0; i < RayPacket::kSize; ++i) {
         if (!wave->alive[i]) continue;
         const float random = SamplerOf(lanes[i], sample).Pair(PairOf(bounce, kGuidePair))[0];
-        radiance[i] += wave->throughput[i].cwiseProduct(LightFromOneGuide(wave->vertices[i], random, count));
+        radiance[i] +=
+            wave->throughput[i].cwiseProduct(LightFromOneGuide(eye, wave->vertices[i], random, count));
       }
     }
   }
@@ -345,9 +374,9 @@ class Tracer {
   // What a vertex sends on of the guides' light, estimated without bias from one of them, chosen by what each
   // would send if nothing stood in its way: guides lie close together, so that one shadow ray tells nearly as
   // much as one to each.
-  Vec3f LightFromOneGuide(const Vertex& vertex, float random, PathCount* count) const {
+  Vec3f LightFromOneGuide(const Eye& eye, const Vertex& vertex, float random, PathCount* count) const {
     float sum = 0;
-    for (const Source& source : sources_) sum += Reflected(source, vertex).sum();
+    for (const Source& source : eye.sources) sum += Reflected(source, vertex).sum();
     if (!std::isfinite(sum)) return Vec3f::Constant(sum);  // for Collect to name
     if (!(sum > 0)) return Vec3f::Zero();
     // Adds up in the order of `sum`, so that random < 1 finds a guide; where random · sum rounds up to sum,
@@ -355,7 +384,7 @@ class Tracer {
     const Source* chosen = nullptr;
     Vec3f light = Vec3f::Zero();
     float below = 0;
-    for (const Source& source : sources_) {
+    for (const Source& source : eye.sources) {
       const Vec3f candidate = Reflected(source, vertex).rowwise().sum();
       if (candidate.sum() == 0) continue;
       chosen = &source;
@@ -373,9 +402,7 @@ class Tracer {
   const View view_;
   const PathOptions options_;
   uint64_t seed_, frame_;
-  Vec3f origin_;
-  Mat3<float> rotation_;
-  std::vector<Source> sources_;
+  Eye eye_;  // at the frame's moment
 };
 
 bool HasShadows(const Light& light) {

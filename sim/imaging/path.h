@@ -10,6 +10,7 @@
 #include "common/light.h"
 #include "common/math.h"
 #include "common/ray_scene.h"
+#include "sim/imaging/shutter.h"
 #include "sim/imaging/surface.h"
 
 namespace lumen {
@@ -32,7 +33,8 @@ struct View {
   const Camera<float>* camera;
   const Image8* valid;  // pixels that are rendered; the others stay 0
   Pose world_from_camera;
-  const Light* light;  // in camera axes
+  const Light* light;                    // in camera axes
+  const CameraMotion* motion = nullptr;  // while the frame is taken; none: it is taken in an instant
 };
 
 // Linear radiance, RGB, 1 = full scale; the parts only if asked for.

@@ -62,6 +62,7 @@ Sensor ReadSensor(const ConfigTable& table) {
   }
   sensor.record_gain = table.Flag("record_gain", sensor.record_gain);
   if (const auto noise = table.Optional("noise")) sensor.noise = ReadSensorNoise(*noise);
+  if (const auto shutter = table.Optional("shutter")) sensor.shutter = ReadShutter(*shutter);
   if (const auto jpeg = table.Optional("jpeg")) sensor.jpeg = ReadJpeg(*jpeg);
   return sensor;
 }

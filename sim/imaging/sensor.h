@@ -11,6 +11,7 @@
 #include "common/response.h"
 #include "sim/imaging/jpeg.h"
 #include "sim/imaging/noise.h"
+#include "sim/imaging/shutter.h"
 
 namespace lumen {
 
@@ -28,6 +29,7 @@ struct Sensor {
   std::optional<AutoGain> auto_gain;  // then `gain` doesn't count
   std::optional<SensorNoise> noise;
   std::optional<Jpeg> jpeg;
+  std::optional<Shutter> shutter;
   bool record_gain = true;  // false: sequence.toml leaves the gains out
 };
 
