@@ -22,6 +22,7 @@ int main(int argc, char** argv) {
   lumen::AddEvaluate(&app);
   lumen::AddLoop(&app);
   lumen::AddCheck(&app);
+  lumen::AddPhotometry(&app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

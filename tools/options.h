@@ -27,5 +27,6 @@ void AddTrain(CLI::App* app);
 void AddEvaluate(CLI::App* app);
 void AddLoop(CLI::App* app);
 void AddCheck(CLI::App* app);
+void AddPhotometry(CLI::App* app);
 
 }  // namespace lumen
