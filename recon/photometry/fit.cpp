@@ -279,30 +279,33 @@ ParameterValues NominalParameters(const Calibration& calibration) {
 
 Pattern PatternAt(const Observations& observations, int64_t pixel, int channel,
                   const ParameterValues& values) {
-  const Light& light = observations.sequence->calibration.light;
-  const double mean_spread = MeanSpread(light);
   const SourceGeometry* geometry = &observations.geometry[pixel * observations.sources];
   double largest = -std::numeric_limits<double>::infinity();
-  const auto log_part = [&](int s) {
-    const LightSource& source = light.sources[s];
-    const double spread = values[int(Parameter::kSpread)] + source.spread - mean_spread;
-    return std::log(source.intensity[channel]) +
-           values[int(Parameter::kTExponent)] * geometry[s].log_distance +
-           values[int(Parameter::kCosExponent)] * geometry[s].log_cos -
-           spread * geometry[s].one_minus_cos_axis;
-  };
-  for (int s = 0; s < observations.sources; ++s) {
-    if (std::isfinite(geometry[s].log_cos)) largest = std::max(largest, log_part(s));
-  }
-  double sum = 0;
+  double sum = 0;  // in units of the largest part so far
   Pattern pattern{};
   for (int s = 0; s < observations.sources; ++s) {
-    if (!std::isfinite(geometry[s].log_cos)) continue;  // the wall faces away: no light
-    const double share = std::exp(log_part(s) - largest);
+    const SourceGeometry& source = geometry[s];
+    if (!std::isfinite(source.log_cos)) continue;  // the wall faces away: no light
+    const SourceConstants& constants = observations.constants[s];
+    const double part =
+        constants.log_intensity[channel] + values[int(Parameter::kTExponent)] * source.log_distance +
+        values[int(Parameter::kCosExponent)] * source.log_cos -
+        (values[int(Parameter::kSpread)] + constants.spread_about_mean) * source.one_minus_cos_axis;
+    double share = 1;
+    if (part > largest) {
+      const double rescale = s == 0 ? 0 : std::exp(largest - part);
+      sum *= rescale;
+      pattern.by_t *= rescale;
+      pattern.by_cos *= rescale;
+      pattern.by_spread *= rescale;
+      largest = part;
+    } else {
+      share = std::exp(part - largest);
+    }
     sum += share;
-    pattern.by_t += share * geometry[s].log_distance;
-    pattern.by_cos += share * geometry[s].log_cos;
-    pattern.by_spread -= share * geometry[s].one_minus_cos_axis;
+    pattern.by_t += share * source.log_distance;
+    pattern.by_cos += share * source.log_cos;
+    pattern.by_spread -= share * source.one_minus_cos_axis;
   }
   pattern.log_sum = largest + std::log(sum) + observations.log_vignetting[pixel];
   pattern.by_t /= sum;
@@ -314,7 +317,7 @@ Pattern PatternAt(const Observations& observations, int64_t pixel, int channel,
 Fit FitModel(const Observations& observations, const FitOptions& options) {
   Problem problem(observations, options);
   constexpr int kMostSteps = 50;
-  constexpr double kStill = 1e-9;  // far below any standard error
+  constexpr double kStill = 1e-8;  // far below any standard error
   MatrixXd inverse;
   for (int step = 0;; ++step) {
     const Normal normal = Accumulate(observations, options, problem);

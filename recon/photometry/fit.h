@@ -62,6 +62,11 @@ struct Fit {
 // "Longitudinal data analysis using generalized linear models"; the correction for few clusters as in Cameron
 // and Miller 2015, "A practitioner's guide to cluster-robust inference", eq. 12).
 //
+// What the model leaves out goes into the figures: interreflection flattens the exponents; noise of a
+// relative variance v lowers a logarithm by v/2 in the mean, more so where it is dark; and where the albedo
+// varies, leaving saturated pixels out leaves the darker ones in, which flattens the exponents where many
+// are.
+//
 // Throws InputError where the pixels can't tell the parameters apart (all of one distance, …).
 Fit FitModel(const Observations& observations, const FitOptions& options);
 

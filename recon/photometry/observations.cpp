@@ -209,7 +209,13 @@ Observations Observe(const Sequence& sequence, const PhotometryOptions& options)
   const Observer observer(sequence, options);
   Observations all;
   all.sequence = &sequence;
-  all.sources = static_cast<int>(sequence.calibration.light.sources.size());
+  const std::vector<LightSource>& sources = sequence.calibration.light.sources;
+  all.sources = static_cast<int>(sources.size());
+  double mean_spread = 0;
+  for (const LightSource& source : sources) mean_spread += source.spread / all.sources;
+  for (const LightSource& source : sources) {
+    all.constants.push_back({source.intensity.array().log().matrix(), source.spread - mean_spread});
+  }
   std::vector<FramePixels> frames;
   Progress progress("photometry");
   bool any_wall = false;

@@ -42,11 +42,18 @@ struct SourceGeometry {
   float one_minus_cos_axis;  // 1 − D·L
 };
 
+// What the light's model needs to know of a source besides.
+struct SourceConstants {
+  Vec3d log_intensity;
+  double spread_about_mean;  // its spread less the mean of all
+};
+
 // Pixels in the order of their cells.
 struct Observations {
   const Sequence* sequence = nullptr;
   int sources = 0;
-  std::vector<int> frames;    // indices into the sequence's frames that are used
+  std::vector<SourceConstants> constants;  // of each
+  std::vector<int> frames;                 // indices into the sequence's frames that are used
   std::vector<int> left_out;  // and of those that aren't: no depth or normals, or too few cells in view
   // A pixel's:
   std::vector<int> frame;                    // index into `frames`

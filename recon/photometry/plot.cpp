@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <numeric>
+
 #include "recon/evaluation/layout.h"
 #include "recon/photometry/chart.h"
 
@@ -27,16 +29,24 @@ ChartPoints Dots(const std::vector<Bin>& bins) {
   return points;
 }
 
-// slope · x over the points' range.
+// Through the points' middle with the given slope, over their range.
 ChartPoints StraightLine(const ChartPoints& points, double slope, const Rgb8& color) {
+  const double count = static_cast<double>(points.x.size());
+  const double middle_x = std::accumulate(points.x.begin(), points.x.end(), 0.0) / count;
+  const double middle_y = std::accumulate(points.y.begin(), points.y.end(), 0.0) / count;
   ChartPoints line;
   line.color = color;
   line.joined = true;
   for (double x : {points.x.front(), points.x.back()}) {
     line.x.push_back(x);
-    line.y.push_back(slope * x);
+    line.y.push_back(middle_y + slope * (x - middle_x));
   }
   return line;
+}
+
+// y = 0 over the points' range.
+ChartPoints ZeroLine(const ChartPoints& points) {
+  return {{points.x.front(), points.x.back()}, {0, 0}, {}, kExpected, true};
 }
 
 Panel FactorPanel(const std::string& what, const std::string& x_label, const std::vector<Bin>& bins,
@@ -47,7 +57,7 @@ Panel FactorPanel(const std::string& what, const std::string& x_label, const std
     chart.series = {StraightLine(dots, sign * figure.expected.value(), kExpected),
                     StraightLine(dots, sign * figure.value, kFitted), dots};
   }
-  return {fmt::format("{}: {:.3f} ± {:.3f} (expected {:.4g})", what, figure.value, figure.standard_error,
+  return {fmt::format("{}: {:.3f} +- {:.3f} (expected {:.4g})", what, figure.value, figure.standard_error,
                       *figure.expected),
           DrawChart(chart, kWidth, kHeight)};
 }
@@ -55,7 +65,7 @@ Panel FactorPanel(const std::string& what, const std::string& x_label, const std
 Panel ResidualPanel(const std::string& title, const std::string& x_label, const std::vector<Bin>& bins) {
   const ChartPoints dots = Dots(bins);
   Chart chart = {x_label, {}};
-  if (!dots.x.empty()) chart.series = {StraightLine(dots, 0, kExpected), dots};
+  if (!dots.x.empty()) chart.series = {ZeroLine(dots), dots};
   return {title, DrawChart(chart, kWidth, kHeight)};
 }
 
@@ -74,6 +84,8 @@ Panel GainPanel(const Photometry& photometry) {
     known.x.push_back(number);
     known.y.push_back(*figure->expected);
   }
+  if (fitted.x.empty())
+    return {"log gain: one frame has none to compare with", DrawChart({}, kWidth, kHeight)};
   return {"log gain about its mean (grey: the sequence's own)",
           DrawChart({"frame", {known, fitted}}, kWidth, kHeight)};
 }

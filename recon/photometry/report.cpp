@@ -9,8 +9,8 @@ namespace lumen {
 namespace {
 
 std::string Value(const Figure* figure) {
-  if (figure == nullptr) return fmt::format("{:>20}", "-");
-  return fmt::format("{:>9.4f} ± {:<8.4f}", figure->value, figure->standard_error);
+  if (figure == nullptr) return fmt::format("{:>13}{:8}", "-", "");
+  return fmt::format("{:>10.5f} ± {:<8.5f}", figure->value, figure->standard_error);
 }
 
 std::string Percent(double part, double whole) {
@@ -18,9 +18,9 @@ std::string Percent(double part, double whole) {
 }
 
 std::string ModelRows(const Photometry& photometry) {
-  std::string table = fmt::format("{:<16}{:>9}{:>20}", "figure", "expected", "all channels    ");
+  std::string table = fmt::format("{:<16}{:>9}{:>21}", "figure", "expected", "all channels    ");
   for (int channel : photometry.channels)
-    table += fmt::format("{:>20}", std::string(ChannelName(channel)) + "      ");
+    table += fmt::format("{:>21}", std::string(ChannelName(channel)) + "       ");
   table += "\n";
   for (const char* name :
        {"t_exponent", "cos_exponent", "spread", "gamma", "gamma_from_gains", "r_squared", "residual"}) {
@@ -35,7 +35,7 @@ std::string ModelRows(const Photometry& photometry) {
     }
     table += "\n";
   }
-  return table + fmt::format("{:<16}{:>9}{:>9.4f}\n", "without light", "", photometry.all.scatter);
+  return table + fmt::format("{:<16}{:>9}{:>10.5f}\n", "without light", "", photometry.all.scatter);
 }
 
 // Gains in one line; JSON has them all.
@@ -57,16 +57,16 @@ std::string GainRow(const Photometry& photometry) {
     }
   }
   if (worst_figure == nullptr) return "";
-  return fmt::format("log gain        {} by {:.4f} in the mean (RMS), most in frame {}: {:+.4f} ± {:.4f}\n",
+  return fmt::format("log gain        {} by {:.5f} in the mean (RMS), most in frame {}: {:+.5f} ± {:.5f}\n",
                      expected ? "off the sequence's own" : "varies",
                      std::sqrt(squares / photometry.frame_numbers.size()), worst_frame,
                      worst_figure->value - worst_figure->expected.value_or(0), worst_figure->standard_error);
 }
 
 std::string BinRows(const std::string& title, const std::vector<Bin>& bins, int64_t count) {
-  std::string table = fmt::format("{:<16}{:>9}{:>20}{:>10}\n", title, "pixels", "mean residual   ", "RMS");
+  std::string table = fmt::format("{:<16}{:>9}{:>21}{:>10}\n", title, "pixels", "mean residual   ", "RMS");
   for (const Bin& bin : bins) {
-    table += fmt::format("{:<16}{:>9}{:>+9.4f} ± {:<8.4f}{:>10.4f}\n",
+    table += fmt::format("{:<16}{:>9}{:>+10.5f} ± {:<8.5f}{:>10.5f}\n",
                          fmt::format("  {:g}-{:g}", bin.from, bin.to), Percent(bin.count, count), bin.mean,
                          bin.standard_error, bin.rms);
   }
