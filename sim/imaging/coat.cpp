@@ -24,6 +24,9 @@ CoatOptions ReadCoat(const ConfigTable& table) {
   options.roughness = table.Number("roughness", options.roughness, kFraction);
   options.relief_mm = table.Number("relief_mm", options.relief_mm, {1e-3, 1e6});
   options.relief_height_mm = table.Number("relief_height_mm", options.relief_height_mm, {0, 1e6});
+  if (table.Has("bounced_roughness")) {
+    options.bounced_roughness = table.Number("bounced_roughness", kFraction);
+  }
   return options;
 }
 

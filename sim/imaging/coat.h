@@ -15,8 +15,14 @@
 //                           high
 //   relief_height_mm  0.06  of the relief, which is noise within ± this height; s is the mesh's smooth
 //                           normal, tilted by the relief's slope. 0 = no relief
+//   bounced_roughness none  roughness that paths meet after their first bounce, in place of `roughness`
 //
 // Relief and roughness are chosen by eye: their glints look like those of C3VD's frames.
+//
+// With bounces, the light that a sharp lobe throws onto other walls is found by few paths, which are bright:
+// white dots until there are many samples. bounced_roughness widens the lobe for that light alone (Kaplanyan
+// and Dachsbacher 2013, "Path space regularization"): it lands more evenly than it would, and is less by what
+// single scattering in the wider lobe loses. Without it the picture is unbiased.
 //
 // Energy: E(c) is what the first lobe sends back at the cosine c, Ē = 2 ∫ E(c) c dc its mean. The second has
 // what is left, shared out so that it stays reciprocal (Kelemen and Szirmay-Kalos 2001): with albedo 1 and no
@@ -29,6 +35,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "common/config.h"
 #include "common/math.h"
@@ -40,6 +47,7 @@ struct CoatOptions {
   double roughness = 0.2;
   double relief_mm = 0.5;
   double relief_height_mm = 0.06;
+  std::optional<double> bounced_roughness;
 };
 
 // Reads the scene's [surface.coat].

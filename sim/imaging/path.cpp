@@ -52,6 +52,7 @@ struct PlainVertex {
 
 struct CoatedVertex : CoatedPlace {
   Vec3f point;
+  const Coat* coat;
 };
 
 // One frame's tracing. The effects that make a difference inside the loops are its template parameters,
@@ -197,8 +198,9 @@ class Tracer {
     for (int i = 0; i < RayPacket::kSize; ++i) {
       wave.alive[i] = hits.face[i] != kNoFace;
       if (!wave.alive[i]) continue;
-      wave.vertices[i] = VertexAt(hits.face[i], hits.u[i], hits.v[i],
-                                  Vec3f(rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]));
+      wave.vertices[i] =
+          VertexAt(hits.face[i], hits.u[i], hits.v[i],
+                   Vec3f(rays.direction[0][i], rays.direction[1][i], rays.direction[2][i]), false);
     }
     SetAlbedos(&wave);
     Lobes direct[RayPacket::kSize];
@@ -227,7 +229,7 @@ class Tracer {
     ++lane->samples;
   }
 
-  Vertex VertexAt(uint32_t face, float u, float v, const Vec3f& incoming) const {
+  Vertex VertexAt(uint32_t face, float u, float v, const Vec3f& incoming, bool bounced) const {
     const Mesh& mesh = scene_.wall->mesh();
     const Vec3i& corners = mesh.faces[face];
     const Vec3d a = mesh.vertices[corners[0]];
@@ -238,7 +240,11 @@ class Tracer {
     const double length = cross.norm();
     vertex.normal = length > 0 ? (cross / length).template cast<float>() : Vec3f(Vec3f::Zero());
     if (vertex.normal.dot(incoming) > 0) vertex.normal = -vertex.normal;
-    if constexpr (kCoat) SetCoat(corners, u, v, incoming, &vertex);
+    if constexpr (kCoat) {
+      const Surface& surface = *scene_.surface;
+      vertex.coat = bounced && surface.bounced_coat ? &*surface.bounced_coat : &*surface.coat;
+      SetCoat(corners, u, v, incoming, &vertex);
+    }
     return vertex;
   }
 
@@ -251,10 +257,9 @@ class Tracer {
     const double length = mean.norm();
     Vec3f smooth = length > 0 ? (mean / length).template cast<float>() : vertex->normal;
     if (smooth.dot(vertex->normal) < 0) smooth = -smooth;
-    const Coat& coat = *scene_.surface->coat;
     vertex->outgoing = -incoming;
-    vertex->coat_normal = coat.ReliefNormal(scene_.surface_seed, vertex->point, smooth);
-    vertex->reflectance = coat.Reflectance(vertex->coat_normal.dot(vertex->outgoing));
+    vertex->coat_normal = vertex->coat->ReliefNormal(scene_.surface_seed, vertex->point, smooth);
+    vertex->reflectance = vertex->coat->Reflectance(vertex->coat_normal.dot(vertex->outgoing));
   }
 
   void SetAlbedos(Wavefront* wave) const {
@@ -276,7 +281,7 @@ class Tracer {
     const float cosine = vertex.normal.dot(irradiance.toward);
     if (!(cosine > 0)) return Lobes::Zero();
     if constexpr (kCoat) {
-      const CoatLobes lobes = scene_.surface->coat->Eval(vertex, irradiance.toward);
+      const CoatLobes lobes = vertex.coat->Eval(vertex, irradiance.toward);
       Lobes light;
       light << source.intensity.cwiseProduct(lobes.base), source.intensity * lobes.glint;
       return irradiance.per_intensity * light;
@@ -345,7 +350,7 @@ class Tracer {
   bool Bounce(const Sampler& sampler, int bounce, Vertex* vertex, Vec3f* throughput, PathCount* count) const {
     Vec3f direction;
     if constexpr (kCoat) {
-      const Coat& coat = *scene_.surface->coat;
+      const Coat& coat = *vertex->coat;
       const float choice = sampler.Pair(PairOf(bounce, kRoulettePair))[1];
       direction = coat.Sample(*vertex, sampler.Pair(PairOf(bounce, kDirectionPair)), choice);
       if (!(direction.dot(vertex->normal) > 0)) return false;
@@ -367,7 +372,7 @@ class Tracer {
     const RayHit hit =
         scene_.wall->Intersect(OffsetOrigin(vertex->point, vertex->normal), direction, 0.0f, kFar);
     ++count->rays;
-    if (hit.hit()) *vertex = VertexAt(hit.face, hit.u, hit.v, direction);
+    if (hit.hit()) *vertex = VertexAt(hit.face, hit.u, hit.v, direction, true);
     return hit.hit();
   }
 

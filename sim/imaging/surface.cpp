@@ -119,7 +119,14 @@ Surface ReadSurface(const ConfigTable& table) {
     surface.vessels->width_mm = vessels->Number("width_mm", surface.vessels->width_mm, {1e-4, 1e6});
     surface.vessels->absorption = vessels->Vector("absorption", surface.vessels->absorption, {0, 50});
   }
-  if (const auto coat = table.Optional("coat")) surface.coat.emplace(ReadCoat(*coat));
+  if (const auto coat = table.Optional("coat")) {
+    CoatOptions options = ReadCoat(*coat);
+    surface.coat.emplace(options);
+    if (options.bounced_roughness) {
+      options.roughness = *options.bounced_roughness;
+      surface.bounced_coat.emplace(options);
+    }
+  }
   return surface;
 }
 

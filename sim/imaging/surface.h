@@ -30,6 +30,7 @@ struct Surface {
   std::optional<Mottling> mottling;
   std::optional<Vessels> vessels;
   std::optional<Coat> coat;
+  std::optional<Coat> bounced_coat;  // that paths meet after a bounce; none: the same
 };
 
 // Reads the scene's [surface].
