@@ -26,6 +26,7 @@ class Binner {
     bin.cell_count += 1;
     bin.cell_sum += y;
     bin.squares += y * y;
+    bin.places += x;
   }
 
   void EndCell() {
@@ -46,6 +47,7 @@ class Binner {
       bin.count += more.count;
       bin.sum += more.sum;
       bin.squares += more.squares;
+      bin.places += more.places;
       bin.count_count += more.count_count;
       bin.count_sum += more.count_sum;
       bin.sum_sum += more.sum_sum;
@@ -63,14 +65,15 @@ class Binner {
       const double scatter = sums.sum_sum - 2 * mean * sums.count_sum + mean * mean * sums.count_count;
       // Rounding may leave a sum of squares that is 0 a little below it.
       bins.push_back({edges_[i], edges_[i + 1], static_cast<int64_t>(sums.count), mean,
-                      std::sqrt(std::max(scatter, 0.0)) / sums.count, std::sqrt(sums.squares / sums.count)});
+                      std::sqrt(std::max(scatter, 0.0)) / sums.count, std::sqrt(sums.squares / sums.count),
+                      sums.places / sums.count});
     }
     return bins;
   }
 
  private:
   struct Sums {
-    double count = 0, sum = 0, squares = 0;
+    double count = 0, sum = 0, squares = 0, places = 0;  // n, Σ y, Σ y², Σ x
     double count_count = 0, count_sum = 0, sum_sum = 0;  // Σ over cells of n², n·S, S²
     double cell_count = 0, cell_sum = 0;                 // of the cell that is being added
   };

@@ -25,6 +25,7 @@ struct Bin {
   double mean = 0;
   double standard_error = 0;  // cluster-robust, with the fit's parameters taken as they are
   double rms = 0;
+  double at = 0;  // mean of what the range is of
 };
 
 struct Photometry {

@@ -22,7 +22,7 @@ ChartPoints Dots(const std::vector<Bin>& bins) {
   points.color = kDots;
   for (const Bin& bin : bins) {
     if (double(bin.count) < kLeastShare * double(count)) continue;
-    points.x.push_back((bin.from + bin.to) / 2);
+    points.x.push_back(bin.at);
     points.y.push_back(bin.mean);
     points.error.push_back(bin.standard_error);
   }

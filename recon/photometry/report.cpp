@@ -17,23 +17,31 @@ std::string Percent(double part, double whole) {
   return whole > 0 ? fmt::format("{:.1f}%", 100 * part / whole) : "-";
 }
 
+// Columns are padded, lines needn't end in it.
+std::string EndLine(std::string line) {
+  line.erase(line.find_last_not_of(' ') + 1);
+  return line + "\n";
+}
+
 std::string ModelRows(const Photometry& photometry) {
-  std::string table = fmt::format("{:<16}{:>9}{:>21}", "figure", "expected", "all channels    ");
-  for (int channel : photometry.channels)
-    table += fmt::format("{:>21}", std::string(ChannelName(channel)) + "       ");
-  table += "\n";
+  std::string head = fmt::format("{:<16}{:>9}{:>21}", "figure", "expected", "all channels    ");
+  for (int channel : photometry.channels) {
+    head += fmt::format("{:>21}", std::string(ChannelName(channel)) + "       ");
+  }
+  std::string table = EndLine(head);
   for (const char* name :
        {"t_exponent", "cos_exponent", "spread", "gamma", "gamma_from_gains", "r_squared", "residual"}) {
     const Figure* figure = photometry.Find(name);
     if (figure == nullptr) continue;
-    table += fmt::format("{:<16}", name) +
-             (figure->expected ? fmt::format("{:>9.4f}", *figure->expected) : fmt::format("{:>9}", "")) +
-             Value(figure);
+    std::string row =
+        fmt::format("{:<16}", name) +
+        (figure->expected ? fmt::format("{:>9.4f}", *figure->expected) : fmt::format("{:>9}", "")) +
+        Value(figure);
     for (int channel : photometry.channels) {
       if (std::string(name).starts_with("gamma")) break;  // of all channels only
-      table += Value(photometry.Find(std::string(ChannelName(channel)) + "." + name));
+      row += Value(photometry.Find(std::string(ChannelName(channel)) + "." + name));
     }
-    table += "\n";
+    table += EndLine(row);
   }
   return table + fmt::format("{:<16}{:>9}{:>10.5f}\n", "without light", "", photometry.all.scatter);
 }
