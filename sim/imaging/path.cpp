@@ -174,8 +174,8 @@ class Tracer {
     return Sampler(seed_, (frame_ << 40) ^ pixel, sample);
   }
 
-  // One sample of each of a block's pixels.
-  void TraceSample(const Eye& eye, int sample, Lane* lanes, PathCount* count) const {
+  // One sample of each of a block's pixels. Flattened: inlined as a whole, whatever other variants there are.
+  [[gnu::flatten]] void TraceSample(const Eye& eye, int sample, Lane* lanes, PathCount* count) const {
     RayPacket rays;
     for (int i = 0; i < RayPacket::kSize; ++i) {
       Vec2f pixel(static_cast<float>(lanes[i].x), static_cast<float>(lanes[i].y));
