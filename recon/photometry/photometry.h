@@ -51,8 +51,7 @@ std::string GainFigureName(int frame_number);
 
 // Fits the model to all channels together and to each alone, then:
 // - γ, with the exponents held at −2 and 1 and the spread free: exponents and γ can't both be free, as a
-// power
-//   of a power is a power. For a response that is a power only.
+//   power of a power is a power. For a response that is a power only.
 // - γ from the gains, with exponents free, where the sequence knows its gains and they differ: radiance then
 //   goes up by known factors, whatever falls off with distance.
 // Throws InputError.

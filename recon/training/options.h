@@ -30,9 +30,9 @@ struct TrainOptions {
 
   struct Loss {
     double eikonal = 0.1;
-    double albedo = 2;           // pull of the log albedo to its mean over neighbouring rays, at the start
+    double albedo = 2;           // pull of the log albedo to its mean over rays drawn together, at the start
     double albedo_final = 0.02;  // the part of it that is left at the end
-    double albedo_width = 0.3;   // of its Huber loss
+    double albedo_width = 0.3;   // of this Huber loss and that of `ambient`
     double ambient = 3;          // the same pull on the log ambient factor, all the time
   } loss;
 

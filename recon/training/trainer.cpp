@@ -9,7 +9,7 @@
 namespace lumen {
 namespace {
 
-constexpr int kChunkRays = 32;
+constexpr int kChunkRays = 32;  // also what the pulls on albedo and ambient factor take their means over
 
 double LogInterpolate(double from, double to, double at) { return from * std::pow(to / from, at); }
 
