@@ -21,14 +21,8 @@
 namespace lumen::test {
 namespace {
 
-// Folds, light at the camera, gains that differ, one sample through each pixel's centre.
-constexpr char kFolds[] = R"([geometry]
-kind = "colon"
-length_mm = 60
-diameter_mm = 40
-bend_rad = 0.5
-tolerance_mm = 0.1
-[trajectory]
+// A way back through a short tube, and what follows its light.
+const std::string kJourney = R"([trajectory]
 kind = "withdrawal"
 start_mm = 44
 end_mm = 14
@@ -41,15 +35,10 @@ width = 150
 height = 120
 [light]
 model = "sls"
-[[light.source]]
-position = [0, 0, 0]
-direction = [0, 0, 1]
-spread = 2.5
-intensity = [3000, 2700, 2400]
-[response]
-gamma = 2.2
-vignetting = 0.7
-[surface]
+)";
+
+// A plain wall, one sample through each pixel's centre, gains that differ; ends in [truth].
+const std::string kWallAndSensor = R"([surface]
 albedo = [0.3, 0.3, 0.3]
 [path]
 samples = 1
@@ -58,11 +47,28 @@ bounces = 0
 target = 0.35
 settling_s = 0.05
 [truth]
-exact = ["radiance"]
+)";
+
+// Folds, light at the camera.
+const std::string kFolds = R"([geometry]
+kind = "colon"
+length_mm = 60
+diameter_mm = 40
+bend_rad = 0.5
+tolerance_mm = 0.1
+)" + kJourney + R"([[light.source]]
+position = [0, 0, 0]
+direction = [0, 0, 1]
+spread = 2.5
+intensity = [3000, 2700, 2400]
+[response]
+gamma = 2.2
+vignetting = 0.7
+)" + kWallAndSensor + R"(exact = ["radiance"]
 )";
 
 // A tube without folds, so that guides off the axis cast no shadows.
-constexpr char kTube[] = R"([geometry]
+const std::string kTube = R"([geometry]
 kind = "colon"
 length_mm = 60
 diameter_mm = 40
@@ -72,20 +78,7 @@ haustra_depth_mm = 0
 taenia_depth_mm = 0
 irregularity_mm = 0
 tolerance_mm = 0.1
-[trajectory]
-kind = "withdrawal"
-start_mm = 44
-end_mm = 14
-frames = 4
-wobble_mm = 4
-wobble_rad = 0.2
-[camera]
-preset = "c3vd"
-width = 150
-height = 120
-[light]
-model = "sls"
-[[light.source]]
+)" + kJourney + R"([[light.source]]
 position = [3.24, 0.55, 0]
 direction = [0, 0, 1]
 spread = 2.9
@@ -102,16 +95,7 @@ spread = 2.1
 intensity = [800, 800, 800]
 [response]
 gamma = 1.8
-[surface]
-albedo = [0.3, 0.3, 0.3]
-[path]
-samples = 1
-bounces = 0
-[sensor.auto_gain]
-target = 0.35
-settling_s = 0.05
-[truth]
-)";
+)" + kWallAndSensor;
 
 void RenderTo(const std::filesystem::path& folder, const std::string& scene) {
   CreateFolder(folder);

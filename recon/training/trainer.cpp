@@ -40,6 +40,7 @@ Trainer::Trainer(const TrainingFrames& frames, const TrainOptions& options, uint
   field_ = std::make_unique<Field<float>>(options.field, initial, Eigen::AlignedBox3d(-half, half));
   for (const Pose& pose : frames.world_from_camera()) {
     lights_.push_back(LightOfFrame<float>(frames.light(), pose, origin_));
+    if (!field_->has_ambient()) continue;
     lights_.back().mean_radiance = frames.MeanRadiance(static_cast<int>(lights_.size()) - 1).cast<float>();
   }
   for (int begin = 0; begin < options.sampling.rays; begin += kChunkRays) {
