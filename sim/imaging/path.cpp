@@ -87,9 +87,7 @@ class Tracer {
       total.samples += count.samples;
       total.rays += count.rays;
       if (total.failure.count == 0) {
-        const int64_t sum = total.failure.count + count.failure.count;
         total.failure = count.failure;
-        total.failure.count = sum;
       } else {
         total.failure.count += count.failure.count;
       }
