@@ -9,6 +9,7 @@
 #include <string_view>
 #include <vector>
 
+#include "common/face_properties.h"
 #include "common/mesh.h"
 
 namespace lumen {
@@ -23,9 +24,10 @@ Mesh ReadPly(const std::filesystem::path& file, std::string_view text);
 
 // The content of a file. Coordinates in the shortest notation that reads back the same; PLY is binary, in
 // double. OBJ: vt is 1 for the faces that are observed, 2 for the others, absent where `observed` is null.
-// Colours as three numbers behind the coordinates. OFF has no colours.
+// Colours as three numbers behind the coordinates. OFF has no colours. Only PLY's faces have properties; each
+// has a value a face.
 std::string ObjText(const Mesh& mesh, const std::vector<bool>* observed = nullptr);
 std::string OffText(const Mesh& mesh);
-std::string PlyText(const Mesh& mesh);
+std::string PlyText(const Mesh& mesh, const std::vector<FaceProperty>& properties = {});
 
 }  // namespace lumen

@@ -5,8 +5,10 @@
 #include <cmath>
 #include <cstring>
 #include <optional>
+#include <stdexcept>
 
 #include "common/error.h"
+#include "common/files.h"
 #include "common/line_reader.h"
 #include "common/mesh_files.h"
 
@@ -306,24 +308,42 @@ Mesh ReadPly(const std::filesystem::path& file, std::string_view text) {
   return mesh;
 }
 
-std::string PlyText(const Mesh& mesh) {
+std::string PlyText(const Mesh& mesh, const std::vector<FaceProperty>& properties) {
   std::string bytes = "ply\nformat binary_little_endian 1.0\nelement vertex " +
                       std::to_string(mesh.vertices.size()) +
                       "\nproperty double x\nproperty double y\nproperty double z\n";
   if (!mesh.colors.empty()) bytes += "property uchar red\nproperty uchar green\nproperty uchar blue\n";
-  bytes += "element face " + std::to_string(mesh.faces.size()) +
-           "\nproperty list uchar int vertex_indices\nend_header\n";
-  bytes.reserve(bytes.size() + mesh.vertices.size() * 27 + mesh.faces.size() * 13);
+  bytes += "element face " + std::to_string(mesh.faces.size()) + "\nproperty list uchar int vertex_indices\n";
+  for (const FaceProperty& property : properties) {
+    const bool whole = std::holds_alternative<std::vector<int32_t>>(property.values);
+    bytes += std::string("property ") + (whole ? "int " : "float ") + property.name + "\n";
+  }
+  bytes += "end_header\n";
+  bytes.reserve(bytes.size() + mesh.vertices.size() * 27 + mesh.faces.size() * (13 + 4 * properties.size()));
   for (size_t i = 0; i < mesh.vertices.size(); ++i) {
     for (double coordinate : mesh.vertices[i]) AppendLittleEndian(&bytes, coordinate);
     if (mesh.colors.empty()) continue;
     for (uint8_t channel : mesh.colors[i]) bytes += static_cast<char>(channel);
   }
-  for (const Vec3i& face : mesh.faces) {
+  for (size_t face = 0; face < mesh.faces.size(); ++face) {
     bytes += '\3';
-    for (int32_t corner : face) AppendLittleEndian(&bytes, corner);
+    for (int32_t corner : mesh.faces[face]) AppendLittleEndian(&bytes, corner);
+    for (const FaceProperty& property : properties) {
+      std::visit([&](const auto& values) { AppendLittleEndian(&bytes, values[face]); }, property.values);
+    }
   }
   return bytes;
+}
+
+void WriteFaceProperties(const std::filesystem::path& file, const Mesh& mesh,
+                         const std::vector<FaceProperty>& properties) {
+  for (const FaceProperty& property : properties) {
+    const size_t count = std::visit([](const auto& values) { return values.size(); }, property.values);
+    if (count != mesh.faces.size()) {
+      throw std::logic_error("WriteFaceProperties: " + property.name + " needs a value a face");
+    }
+  }
+  WriteFile(file, PlyText(mesh, properties));
 }
 
 }  // namespace lumen

@@ -153,30 +153,45 @@ void StoreGeometry(const Eye& eye, const Block& block, const Met& met, FrameTrut
   }
 }
 
-// Flow to the frame before, and whether it sees the place.
-void StoreMotion(const Eye& previous, const Block& block, const Met& met, FrameTruth* truth) {
-  RayPacket packet = EmptyPacket(previous.local_origin);
+void StoreSmoothNormal(const Eye& eye, const Block& block, const Met& met, const std::vector<Vec3d>& normals,
+                       ImageF* smooth_normal) {
+  for (int lane = 0; lane < block.count; ++lane) {
+    if (met.hits.face[lane] == kNoFace) continue;
+    const Vec3i& corners = eye.wall.mesh().faces[met.hits.face[lane]];
+    const double u = met.hits.u[lane], v = met.hits.v[lane];
+    const Vec3d mean = (1 - u - v) * normals[corners[0]] + u * normals[corners[1]] + v * normals[corners[2]];
+    const bool away = met.normal[lane].dot(block.direction[lane]) > 0;
+    const Vec3d facing = away ? Vec3d(-met.normal[lane]) : met.normal[lane];
+    Vec3d smooth = mean.norm() > 0 ? mean.normalized() : facing;
+    if (smooth.dot(facing) < 0) smooth = -smooth;
+    Store(eye.camera_from_world.linear() * smooth, smooth_normal->Pixel(block.x[lane], block.y));
+  }
+}
+
+// Flow to a neighbouring frame, and whether it sees the place.
+void StoreMotion(const Eye& neighbour, const Block& block, const Met& met, ImageF* flow, ImageF* seen) {
+  RayPacket packet = EmptyPacket(neighbour.local_origin);
   bool candidate[kLanes] = {};
   for (int lane = 0; lane < block.count; ++lane) {
     if (met.hits.face[lane] == kNoFace) continue;
     const int x = block.x[lane], y = block.y;
-    *truth->seen_before.Pixel(x, y) = 0;
-    const auto pixel = previous.Project(met.place[lane]);
+    *seen->Pixel(x, y) = 0;
+    const auto pixel = neighbour.Project(met.place[lane]);
     if (!pixel) continue;
-    truth->flow.Pixel(x, y)[0] = static_cast<float>(pixel->x() - x);
-    truth->flow.Pixel(x, y)[1] = static_cast<float>(pixel->y() - y);
-    if (!previous.InValidPixel(*pixel)) continue;
+    flow->Pixel(x, y)[0] = static_cast<float>(pixel->x() - x);
+    flow->Pixel(x, y)[1] = static_cast<float>(pixel->y() - y);
+    if (!neighbour.InValidPixel(*pixel)) continue;
     Vec3d direction;
-    const float reach = previous.Aim(met.place[lane], met.normal[lane], &direction);
+    const float reach = neighbour.Aim(met.place[lane], met.normal[lane], &direction);
     // Seen from the other side it is not the same place.
     if (direction.dot(met.normal[lane]) * block.direction[lane].dot(met.normal[lane]) <= 0) continue;
     candidate[lane] = true;
     SetRay(&packet, lane, direction, 0, reach);
   }
   uint8_t occluded[kLanes];
-  previous.wall.Occluded(packet, occluded);
+  neighbour.wall.Occluded(packet, occluded);
   for (int lane = 0; lane < block.count; ++lane) {
-    if (candidate[lane] && !occluded[lane]) *truth->seen_before.Pixel(block.x[lane], block.y) = 1;
+    if (candidate[lane] && !occluded[lane]) *seen->Pixel(block.x[lane], block.y) = 1;
   }
 }
 
@@ -237,7 +252,8 @@ bool SeesFace(const Eye& eye, int face) {
 }  // namespace
 
 FrameTruth ComputeTruth(const RayScene& wall, const Camera<double>& camera, const Image8& valid,
-                        const Pose& world_from_camera, const Pose* world_from_previous) {
+                        const Pose& world_from_camera, const Pose* world_from_previous,
+                        const TruthExtras& extras) {
   const int width = valid.width, height = valid.height;
   FrameTruth truth;
   truth.z = truth.distance = ImageF(width, height, 1, kNothing);
@@ -247,13 +263,23 @@ FrameTruth ComputeTruth(const RayScene& wall, const Camera<double>& camera, cons
     truth.flow = ImageF(width, height, 2, kNothing);
     truth.seen_before = ImageF(width, height, 1, kNothing);
   }
+  if (extras.world_from_next) {
+    truth.flow_next = ImageF(width, height, 2, kNothing);
+    truth.seen_after = ImageF(width, height, 1, kNothing);
+  }
+  if (extras.vertex_normals) truth.smooth_normal = truth.normal;
   const Eye eye(wall, camera, valid, world_from_camera);
-  std::optional<Eye> previous;
+  std::optional<Eye> previous, next;
   if (world_from_previous) previous.emplace(wall, camera, valid, *world_from_previous);
+  if (extras.world_from_next) next.emplace(wall, camera, valid, *extras.world_from_next);
   ForEachBlock(camera, valid, world_from_camera, [&](const Block& block) {
     const Met met = Meet(eye, block);
     StoreGeometry(eye, block, met, &truth);
-    if (previous) StoreMotion(*previous, block, met, &truth);
+    if (extras.vertex_normals) {
+      StoreSmoothNormal(eye, block, met, *extras.vertex_normals, &truth.smooth_normal);
+    }
+    if (previous) StoreMotion(*previous, block, met, &truth.flow, &truth.seen_before);
+    if (next) StoreMotion(*next, block, met, &truth.flow_next, &truth.seen_after);
     StoreOcclusion(eye, block, met, &truth);
   });
   return truth;

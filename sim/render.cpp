@@ -10,7 +10,9 @@
 #include "common/jpeg.h"
 #include "common/parallel.h"
 #include "common/progress.h"
+#include "sim/face_visibility.h"
 #include "sim/ground_truth.h"
+#include "sim/surface_maps.h"
 
 namespace lumen {
 namespace {
@@ -28,7 +30,8 @@ class Renderer {
       : scene_(scene),
         options_(options),
         wall_(scene.geometry.mesh),
-        vertex_normals_(scene.surface.coat ? VertexNormals(scene.geometry.mesh) : std::vector<Vec3d>()),
+        vertex_normals_(scene.surface.coat || Wants("shading_normal") ? VertexNormals(scene.geometry.mesh)
+                                                                      : std::vector<Vec3d>()),
         path_scene_{&wall_, &scene.surface, RandomBits(options.seed, kSurfaceSeed), &vertex_normals_},
         camera_(scene.calibration.camera),
         fast_camera_(scene.calibration.camera),
@@ -75,7 +78,7 @@ class Renderer {
     return {&camera, &valid, scene_.world_from_camera[frame], &scene_.calibration.light, nullptr};
   }
 
-  std::vector<double> Gains() const {
+  std::vector<double> Gains() {
     if (!scene_.sensor.auto_gain)
       return std::vector<double>(scene_.world_from_camera.size(), scene_.sensor.gain);
     Calibration small = scene_.calibration;
@@ -97,8 +100,9 @@ class Renderer {
     std::vector<double> brightness;
     for (int frame = 0; frame < last_; ++frame) {
       Film film;
-      RenderFrame(path_scene_, ViewOf(frame, fast_camera, valid), path, RandomBits(options_.seed, kMeterSeed),
-                  frame, false, &film);
+      const PathCount count = RenderFrame(path_scene_, ViewOf(frame, fast_camera, valid), path,
+                                          RandomBits(options_.seed, kMeterSeed), frame, false, &film);
+      NoteFailure(frame, " of the metering picture", count.failure);
       brightness.push_back(MeterBrightness(scene_.calibration.response, film.radiance, valid, camera));
     }
     return RunAutoGain(*scene_.sensor.auto_gain, scene_.calibration.response, brightness);
@@ -117,13 +121,13 @@ class Renderer {
     if (Wants("glint") && film.glint.empty()) film.glint = ImageF(valid_.width, valid_.height, 3);
     result_.samples += count.samples;
     result_.rays += count.rays;
-    NoteFailure(frame, count.failure);
+    NoteFailure(frame, "", count.failure);
     WriteImage(FrameFile(options_.folder, frame, "color.png"),
                Photograph(frame, gain, film.radiance, vignetting));
     if (scene_.truth.c3vd || !scene_.truth.exact.empty()) {
       const Pose* previous = frame > 0 ? &scene_.world_from_camera[frame - 1] : nullptr;
       const FrameTruth truth =
-          ComputeTruth(wall_, camera_, valid_, scene_.world_from_camera[frame], previous);
+          ComputeTruth(wall_, camera_, valid_, scene_.world_from_camera[frame], previous, ExtrasOf(frame));
       if (scene_.truth.c3vd) WriteC3vd(frame, truth);
       if (!scene_.truth.exact.empty()) WriteExact(frame, film, truth);
     }
@@ -151,13 +155,12 @@ class Renderer {
     return Develop(response, gain, signal, no_more_vignetting, valid_);
   }
 
-  void NoteFailure(int frame, const Failure& failure) {
+  void NoteFailure(int frame, const std::string& picture, const Failure& failure) {
     if (failure.count > 0 && result_.not_finite == 0) {
+      result_.first_not_finite_frame = frame;
       result_.first_not_finite = "frame " + std::to_string(frame) + ", pixel (" + std::to_string(failure.x) +
-                                 ", " + std::to_string(failure.y) + "), sample " +
-                                 std::to_string(failure.sample) + "; replay it with --frames " +
-                                 std::to_string(frame) + ":" + std::to_string(frame + 1) + " --seed " +
-                                 std::to_string(options_.seed);
+                                 ", " + std::to_string(failure.y) + ")" + picture + ", sample " +
+                                 std::to_string(failure.sample);
     }
     result_.not_finite += failure.count;
   }
@@ -170,18 +173,14 @@ class Renderer {
       WriteImage(FrameFile(options_.folder, frame, "flow.tiff"), EncodeFlow(truth.flow));
   }
 
-  ImageF AlbedoMap(const FrameTruth& truth) const {
-    ImageF albedo(truth.position.width, truth.position.height, 3, std::numeric_limits<float>::quiet_NaN());
-    ParallelFor(0, albedo.height, [&](int64_t y) {
-      for (int x = 0; x < albedo.width; ++x) {
-        const float* p = truth.position.Pixel(x, static_cast<int>(y));
-        if (std::isnan(p[0])) continue;
-        const Vec3f value =
-            AlbedoAt(scene_.surface, path_scene_.surface_seed, wall_.ToLocal(Vec3d(p[0], p[1], p[2])));
-        std::copy(value.data(), value.data() + 3, albedo.Pixel(x, static_cast<int>(y)));
-      }
-    });
-    return albedo;
+  TruthExtras ExtrasOf(int frame) const {
+    TruthExtras extras;
+    const bool has_next = frame + 1 < static_cast<int>(scene_.world_from_camera.size());
+    if (has_next && (Wants("flow_next") || Wants("seen_after"))) {
+      extras.world_from_next = &scene_.world_from_camera[frame + 1];
+    }
+    if (Wants("shading_normal")) extras.vertex_normals = &vertex_normals_;
+    return extras;
   }
 
   void WriteExact(int frame, const Film& film, const FrameTruth& truth) const {
@@ -197,13 +196,20 @@ class Renderer {
     add("direct", film.direct, rgb);
     add("indirect", film.indirect, rgb);
     add("glint", film.glint, rgb);
-    if (Wants("albedo")) add("albedo", AlbedoMap(truth), rgb);
+    const uint64_t seed = path_scene_.surface_seed;
+    if (Wants("albedo")) add("albedo", AlbedoMap(scene_.surface, seed, wall_, truth), rgb);
     add("z", truth.z, one);
     add("distance", truth.distance, one);
     add("normal", truth.normal, xyz);
+    if (Wants("shading_normal")) {
+      const Pose& pose = scene_.world_from_camera[frame];
+      add("shading_normal", ShadingNormalMap(scene_.surface, seed, wall_, pose, truth), xyz);
+    }
     add("position", truth.position, xyz);
     add("flow", truth.flow, {"X", "Y"});
     add("seen_before", truth.seen_before, one);
+    add("flow_next", truth.flow_next, {"X", "Y"});
+    add("seen_after", truth.seen_after, one);
     ImageF all(truth.z.width, truth.z.height, static_cast<int>(names.size()));
     int channel = 0;
     for (const ImageF& image : images) {
@@ -224,7 +230,6 @@ class Renderer {
 
   void WriteSequence(const std::vector<double>& gains) const {
     const Mesh& mesh = scene_.geometry.mesh;
-    std::vector<uint8_t> seen(mesh.faces.size(), 0);
     Sequence sequence;
     sequence.folder = options_.folder;
     sequence.has_toml = true;
@@ -235,13 +240,33 @@ class Renderer {
       entry.world_from_camera = scene_.world_from_camera[frame];
       if (scene_.sensor.record_gain) entry.gain = gains[frame];
       sequence.frames.push_back(entry);
-      MarkObserved(wall_, camera_, valid_, entry.world_from_camera, &seen);
     }
-    WriteCoverageMesh(options_.folder / "coverage_mesh.obj", mesh,
-                      std::vector<bool>(seen.begin(), seen.end()));
+    WriteCoverageMesh(options_.folder / "coverage_mesh.obj", mesh, Observed());
     sequence.ground_truth_mesh = options_.folder / "mesh.ply";
     WriteMesh(sequence.ground_truth_mesh, mesh);
     WriteSequenceHeader(sequence);
+  }
+
+  // The faces that the frames see. How often and how well is written if it is asked for: it takes a look at
+  // every face from every frame.
+  std::vector<bool> Observed() const {
+    const Mesh& mesh = scene_.geometry.mesh;
+    std::vector<uint8_t> seen(mesh.faces.size(), 0);
+    if (!Wants("visibility")) {
+      for (int frame = options_.first_frame; frame < last_; ++frame) {
+        MarkObserved(wall_, camera_, valid_, scene_.world_from_camera[frame], &seen);
+      }
+      return std::vector<bool>(seen.begin(), seen.end());
+    }
+    FaceVisibility visibility(mesh.faces.size());
+    for (int frame = options_.first_frame; frame < last_; ++frame) {
+      const Pose& pose = scene_.world_from_camera[frame];
+      std::fill(seen.begin(), seen.end(), uint8_t{0});
+      MarkObserved(wall_, camera_, valid_, pose, &seen);
+      AddFrame(mesh, pose.translation(), seen, &visibility);
+    }
+    WriteFaceVisibility(options_.folder / "exact" / "visibility.ply", mesh, visibility);
+    return std::vector<bool>(visibility.frames.begin(), visibility.frames.end());
   }
 
   // Whatever an earlier render left would be taken for this one's: frames that this one doesn't have, truth
@@ -254,7 +279,8 @@ class Renderer {
                        ": holds a sequence that wasn't rendered (pose.txt without sequence.toml); " +
                        "choose another folder");
     }
-    for (const char* name : {"pose.txt", "sequence.toml", "calibration.toml", "mask.png"}) {
+    for (const char* name :
+         {"pose.txt", "sequence.toml", "calibration.toml", "mask.png", "exact/visibility.ply"}) {
       std::filesystem::remove(folder / name);
     }
     static const std::regex kFrameFile(

@@ -22,8 +22,9 @@ struct RenderResult {
   int frames = 0;
   int64_t samples = 0;
   int64_t rays = 0;
-  int64_t not_finite = 0;        // samples left out
-  std::string first_not_finite;  // where the first was and how to replay it
+  int64_t not_finite = 0;        // samples left out, the metering's included
+  std::string first_not_finite;  // where the first was: frame, pixel, sample
+  int first_not_finite_frame = -1;
   std::vector<std::string> effects;
 };
 

@@ -124,9 +124,10 @@ void CheckLightInLumen(const Scene& scene, const std::filesystem::path& file) {
 }  // namespace
 
 const std::vector<std::string>& ExactChannels() {
-  static const std::vector<std::string> channels = {"radiance", "direct",   "indirect", "glint",
-                                                    "albedo",   "z",        "distance", "normal",
-                                                    "position", "flow",     "seen_before"};
+  static const std::vector<std::string> channels = {
+      "radiance", "direct",      "indirect",  "glint",          "albedo",
+      "z",        "distance",    "normal",    "shading_normal", "position",
+      "flow",     "seen_before", "flow_next", "seen_after",     "visibility"};
   return channels;
 }
 

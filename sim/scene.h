@@ -17,7 +17,7 @@ namespace lumen {
 
 struct TruthOptions {
   bool c3vd = true;                // depth, normals, flow, occlusion in C3VD's encodings
-  std::vector<std::string> exact;  // channels of exact/NNNN.exr
+  std::vector<std::string> exact;  // channels of exact/NNNN.exr; "visibility": exact/visibility.ply
 };
 
 struct Scene {

@@ -19,7 +19,25 @@ void ReadFrameRange(const std::string& text, RenderOptions* options) {
   options->last_frame = end;
 }
 
+// As a shell takes it for one word.
+std::string Quoted(const std::string& word) {
+  const bool plain = word.find_first_not_of(
+                         "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789"
+                         "_-./=,:+%@") == std::string::npos;
+  if (plain && !word.empty()) return word;
+  std::string quoted = "'";
+  for (const char c : word) quoted += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return quoted + "'";
+}
+
 }  // namespace
+
+std::string ReplayCommand(const RenderArguments& arguments, uint64_t seed, int frame) {
+  std::string command = "lumen render " + Quoted(arguments.scene.string());
+  for (const std::string& setting : arguments.settings) command += " --set " + Quoted(setting);
+  return command + " --frames " + std::to_string(frame) + ":" + std::to_string(frame + 1) + " --seed " +
+         std::to_string(seed) + " -o replay";
+}
 
 void AddRenderArguments(CLI::App* command, RenderArguments* arguments) {
   command->add_option("scene", arguments->scene, "scene file (see scenes/README.md)")->required();
@@ -35,14 +53,18 @@ RenderResult RunRender(const RenderArguments& arguments, uint64_t seed, const st
   const RenderResult result = Render(ReadScene(arguments.scene, arguments.settings, seed), options);
   if (result.not_finite > 0) {
     std::cerr << "lumen: " << result.not_finite
-              << " samples were not finite and are left out; the first: " << result.first_not_finite << "\n";
+              << " samples were not finite and are left out; the first: " << result.first_not_finite
+              << "; replay it with: " << ReplayCommand(arguments, seed, result.first_not_finite_frame)
+              << "\n";
   }
   return result;
 }
 
 nlohmann::json ToJson(const RenderResult& result) {
-  return {{"seconds", result.seconds}, {"frames", result.frames},         {"samples", result.samples},
-          {"rays", result.rays},       {"not_finite", result.not_finite}, {"effects", result.effects}};
+  return {{"seconds", result.seconds},       {"frames", result.frames},
+          {"samples", result.samples},       {"rays", result.rays},
+          {"not_finite", result.not_finite}, {"first_not_finite", result.first_not_finite},
+          {"effects", result.effects}};
 }
 
 }  // namespace lumen

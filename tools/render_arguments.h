@@ -20,7 +20,10 @@ struct RenderArguments {
 // Adds SCENE, --frames and --set.
 void AddRenderArguments(CLI::App* command, RenderArguments* arguments);
 
-// Reads the scene, renders it into `folder` and says on stderr what was not finite.
+// The command that renders one of the frames again, the very same numbers, with every setting.
+std::string ReplayCommand(const RenderArguments& arguments, uint64_t seed, int frame);
+
+// Reads the scene, renders it into `folder` and says on stderr what was not finite and how to replay it.
 RenderResult RunRender(const RenderArguments& arguments, uint64_t seed, const std::filesystem::path& folder);
 
 nlohmann::json ToJson(const RenderResult& result);
