@@ -221,13 +221,18 @@ TEST(Subsurface, HalfSpaceReflectsAsInClosedForm) {
   }
 }
 
-TEST(Subsurface, DefaultsReflectWhatTheHeadSays) {
-  const SubsurfaceOptions defaults;
-  const Vec3d albedos =
-      defaults.scattering_per_mm.cwiseQuotient(defaults.scattering_per_mm + defaults.absorption_per_mm);
-  EXPECT_NEAR(ChandrasekharH(albedos[0]).DiffuseReflectance(), 0.23, 0.005);
-  EXPECT_NEAR(ChandrasekharH(albedos[1]).DiffuseReflectance(), 0.16, 0.005);
-  EXPECT_NEAR(ChandrasekharH(albedos[2]).DiffuseReflectance(), 0.11, 0.005);
+TEST(Subsurface, EvenReflectanceIsTheClosedForm) {
+  for (const Vec3d& albedos : {Vec3d(0, 0.1, 0.5), Vec3d(0.9, 0.99, 1)}) {
+    const Vec3f reflectance = Subsurface(WithAlbedos(albedos, {2, 0.1, 7})).EvenReflectance();
+    for (int c = 0; c < 3; ++c) {
+      EXPECT_NEAR(reflectance[c], ChandrasekharH(albedos[c]).DiffuseReflectance(), 2e-4) << albedos[c];
+    }
+  }
+  EXPECT_NEAR(Subsurface({Vec3d::Zero(), Vec3d::Zero()}).EvenReflectance().norm(), 0, 1e-6);
+  // The head's figures.
+  EXPECT_TRUE(Subsurface(SubsurfaceOptions{}).EvenReflectance().isApprox(Vec3f(0.23f, 0.16f, 0.11f), 0.02f));
+  const SubsurfaceOptions perfused{{0.06, 1.1, 1.6}, SubsurfaceOptions{}.scattering_per_mm};
+  EXPECT_TRUE(Subsurface(perfused).EvenReflectance().isApprox(Vec3f(0.54f, 0.12f, 0.10f), 0.02f));
 }
 
 // A walk in double of one channel, by its absorption's own chance, with walls given by a formula.
@@ -512,7 +517,7 @@ TEST(Subsurface, ExtremeTissueGivesFiniteWeights) {
           EXPECT_TRUE(exit.weight.allFinite());
           EXPECT_GE(exit.weight.minCoeff(), 0);
           if (exit.found) {
-            EXPECT_TRUE(exit.point.allFinite() && exit.face < stage->mesh.faces.size());
+            EXPECT_TRUE(exit.point.allFinite() && exit.hit.face < stage->mesh.faces.size());
             EXPECT_NEAR(exit.normal.norm(), 1, 1e-6);
           } else {
             EXPECT_EQ(exit.weight, Vec3f::Zero());
@@ -546,7 +551,7 @@ TEST(Subsurface, AnyNumberOfThreadsGivesTheSameWalks) {
       float* to = &numbers[size_t(i) * 8];
       std::copy_n(exit.point.data(), exit.found ? 3 : 0, to);
       std::copy_n(exit.weight.data(), 3, to + 3);
-      to[6] = float(exit.face);
+      to[6] = float(exit.hit.face);
       to[7] = float(rays);
     });
     SetThreadCount(0);

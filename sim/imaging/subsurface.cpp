@@ -70,6 +70,19 @@ struct Inside {
   }
 };
 
+// Chandrasekhar's H for isotropic scattering as an integral (Stibbs and Weir 1959, "On the H-functions for
+// isotropic scattering"), by the midpoint rule.
+double ChandrasekharH(double albedo, double cosine) {
+  constexpr int kSteps = 400;
+  double sum = 0;
+  for (int i = 0; i < kSteps; ++i) {
+    const double angle = (i + 0.5) / kSteps * kPi / 2, across = cosine * std::sin(angle);
+    sum += std::log(1 - albedo * angle / std::tan(angle)) /
+           (std::cos(angle) * std::cos(angle) + across * across) / kSteps;
+  }
+  return std::exp(-cosine / 2 * sum);
+}
+
 }  // namespace
 
 SubsurfaceOptions ReadSubsurface(const ConfigTable& table) {
@@ -82,6 +95,21 @@ SubsurfaceOptions ReadSubsurface(const ConfigTable& table) {
 Subsurface::Subsurface(const SubsurfaceOptions& options)
     : scattering_(options.scattering_per_mm.cast<float>()),
       extinction_((options.absorption_per_mm + options.scattering_per_mm).cast<float>()) {}
+
+Vec3f Subsurface::EvenReflectance() const {
+  constexpr int kSteps = 50;
+  Vec3f reflectance;
+  for (int c = 0; c < 3; ++c) {
+    const double albedo = extinction_[c] > 0 ? double(scattering_[c]) / extinction_[c] : 0;
+    double moment = 0;
+    for (int i = 0; i < kSteps; ++i) {
+      const double cosine = (i + 0.5) / kSteps;
+      moment += ChandrasekharH(albedo, cosine) * cosine / kSteps;
+    }
+    reflectance[c] = static_cast<float>(1 - 2 * std::sqrt(1 - albedo) * moment);
+  }
+  return reflectance;
+}
 
 float Subsurface::FreePath(const Vec3f& carried, float choice, float random) const {
   const float threshold = choice * carried.sum();
@@ -111,7 +139,7 @@ void Subsurface::Cross(float path_mm, Vec3f* carried) const {
 
 WalkExit Subsurface::Walk(const RayScene& wall, const WalkEntry& entry, const SampleStream& random,
                           int64_t* rays) const {
-  constexpr WalkExit (*kLost)() = [] { return WalkExit{false, kNoFace, {}, {}, Vec3f::Zero()}; };
+  constexpr WalkExit (*kLost)() = [] { return WalkExit{false, {}, {}, {}, Vec3f::Zero()}; };
   const Inside inside(wall, entry);
   Vec3f point = entry.point, direction = entry.direction;
   Vec3f carried(1, 1, 1);
@@ -123,7 +151,7 @@ WalkExit Subsurface::Walk(const RayScene& wall, const WalkEntry& entry, const Sa
     const RayHit hit = inside.Leave(point, direction, std::min(path, kFar), &place, rays);
     if (hit.hit()) {
       Cross(hit.t, &carried);
-      return {true, hit.face, place.point, place.normal, carried};
+      return {true, hit, place.point, place.normal, carried};
     }
     if (!(path < kFar)) return kLost();
     Scatter(path, &carried);

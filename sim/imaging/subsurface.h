@@ -61,8 +61,8 @@ struct WalkEntry {
 };
 
 struct WalkExit {
-  bool found;  // false: the light stays in the tissue, and weight is 0
-  uint32_t face;
+  bool found;           // false: the light stays in the tissue, and weight is 0
+  RayHit hit;           // of the wall
   Vec3f point, normal;  // as above
   Vec3f weight;         // RGB: on the average over walks, the share of the light that leaves
 };
@@ -75,6 +75,10 @@ class Subsurface {
   // Adds to the number of rays.
   WalkExit Walk(const RayScene& wall, const WalkEntry& entry, const SampleStream& random,
                 int64_t* rays) const;
+
+  // The share of the light, RGB, that an even wall sends back if it comes from all sides alike: the head's
+  // formula.
+  Vec3f EvenReflectance() const;
 
   // The walk's parts, for three channels of which each still carries `carried`. A length, mm, from two
   // numbers in [0, 1); infinite where the channel that `choice` draws has no extinction.
