@@ -562,6 +562,37 @@ TEST(Subsurface, AnyNumberOfThreadsGivesTheSameWalks) {
   EXPECT_EQ(one, walks(5));
 }
 
+// From places as rays find them, on a plane that rounding doesn't keep to, and along it: every walk ends.
+TEST(Subsurface, EveryWalkEndsWhereverItStarts) {
+  Mesh mesh;
+  AddSquare(300, 0, true, &mesh);
+  for (Vec3d& vertex : mesh.vertices) {
+    vertex = Eigen::AngleAxisd(0.7, Vec3d(1, 2, 3).normalized()) * vertex + Vec3d(70, -3, 11);
+  }
+  const RayScene wall(mesh);
+  const Vec3f normal = FaceNormal(mesh, 0).cast<float>(), across = TangentFrame(normal).tangent;
+  const Subsurface tissue(WithAlbedos({0.9, 0.6, 0.3}, {1, 2, 0.7}));
+  Mean weight;
+  int64_t rays = 0;
+  const int count = 20000;
+  for (int i = 0; i < count; ++i) {
+    const SampleStream random(12, 0, uint64_t(i)), other(12, 1, uint64_t(i));
+    const Vec3f eye = 20 * normal + (other.Uniform(2) - 0.5f) * 30 * across;
+    const Vec3f down = lambert::Sample(-normal, Vec2f(other.Uniform(0) / 4, other.Uniform(1)));
+    const RayHit hit = wall.Intersect(eye, down, 0, 1e9f);
+    ASSERT_TRUE(hit.hit());
+    const float slant = i % 4 == 0 ? 1e-4f : 1.0f;
+    const Vec3f inward = (slant * lambert::Sample(-normal, Vec2f(other.Uniform(3), other.Uniform(4))) +
+                          (1 - slant) * across)
+                             .normalized();
+    const WalkExit exit = tissue.Walk(wall, {hit.face, eye + hit.t * down, normal, inward}, random, &rays);
+    EXPECT_TRUE(exit.weight.allFinite());
+    if (i % 4 != 0) weight.Add(exit.weight[0]);
+  }
+  ExpectMean(weight, tissue.EvenReflectance()[0]);
+  EXPECT_LT(double(rays), 100.0 * count);
+}
+
 // Faces turned the other way round mean the same wall: the side that light comes from is the lumen's.
 TEST(Subsurface, FacesMayBeOrientedEitherWay) {
   const Vec3f aim = Vec3f(0.3f, 0.5f, 0.7f).normalized();

@@ -64,7 +64,8 @@ struct Inside {
       *place = PlaceOf(wall, hit);
       place->normal *= turn;
       if (place->normal.dot(direction) > 0) return hit;
-      tnear = std::nextafter(hit.t, std::numeric_limits<float>::infinity());
+      // Beyond what rounds where distances are compared, or the ray would meet the same face for ever.
+      tnear = hit.t * (1 + 0x1p-20f) + 0x1p-40f;
       if (!(tnear < tfar)) return {};
     }
   }
