@@ -168,23 +168,53 @@ void StoreSmoothNormal(const Eye& eye, const Block& block, const Met& met, const
   }
 }
 
+// Where a place on a face is when the wall has become another with the same faces: it keeps its weights of
+// the face's corners. A face without area gives its first corner.
+Vec3d Carried(const Mesh& mesh, uint32_t face, const Vec3d& place, const Mesh& other) {
+  const Vec3i& corners = mesh.faces[face];
+  const Vec3d& a = mesh.vertices[corners[0]];
+  const Vec3d ab = mesh.vertices[corners[1]] - a, ac = mesh.vertices[corners[2]] - a, ap = place - a;
+  const Vec3d normal = ab.cross(ac);
+  const double squared = normal.squaredNorm();
+  const double u = squared > 0 ? ap.cross(ac).dot(normal) / squared : 0;
+  const double v = squared > 0 ? ab.cross(ap).dot(normal) / squared : 0;
+  const Vec3d& moved_a = other.vertices[corners[0]];
+  return moved_a + u * (other.vertices[corners[1]] - moved_a) + v * (other.vertices[corners[2]] - moved_a);
+}
+
+void StoreRestPosition(const Eye& eye, const Block& block, const Met& met, const Mesh& rest,
+                       ImageF* rest_position) {
+  for (int lane = 0; lane < block.count; ++lane) {
+    const uint32_t face = met.hits.face[lane];
+    if (face == kNoFace) continue;
+    Store(Carried(eye.wall.mesh(), face, met.place[lane], rest),
+          rest_position->Pixel(block.x[lane], block.y));
+  }
+}
+
 // Flow to a neighbouring frame, and whether it sees the place.
-void StoreMotion(const Eye& neighbour, const Block& block, const Met& met, ImageF* flow, ImageF* seen) {
+void StoreMotion(const Eye& eye, const Eye& neighbour, const Block& block, const Met& met, ImageF* flow,
+                 ImageF* seen) {
+  const bool moves = &neighbour.wall != &eye.wall;
   RayPacket packet = EmptyPacket(neighbour.local_origin);
   bool candidate[kLanes] = {};
   for (int lane = 0; lane < block.count; ++lane) {
     if (met.hits.face[lane] == kNoFace) continue;
     const int x = block.x[lane], y = block.y;
     *seen->Pixel(x, y) = 0;
-    const auto pixel = neighbour.Project(met.place[lane]);
+    const uint32_t face = met.hits.face[lane];
+    const Vec3d place =
+        moves ? Carried(eye.wall.mesh(), face, met.place[lane], neighbour.wall.mesh()) : met.place[lane];
+    const auto pixel = neighbour.Project(place);
     if (!pixel) continue;
     flow->Pixel(x, y)[0] = static_cast<float>(pixel->x() - x);
     flow->Pixel(x, y)[1] = static_cast<float>(pixel->y() - y);
     if (!neighbour.InValidPixel(*pixel)) continue;
     Vec3d direction;
-    const float reach = neighbour.Aim(met.place[lane], met.normal[lane], &direction);
+    const Vec3d normal = moves ? FaceNormal(neighbour.wall.mesh(), static_cast<int>(face)) : met.normal[lane];
+    const float reach = neighbour.Aim(place, normal, &direction);
     // Seen from the other side it is not the same place.
-    if (direction.dot(met.normal[lane]) * block.direction[lane].dot(met.normal[lane]) <= 0) continue;
+    if (direction.dot(normal) * block.direction[lane].dot(met.normal[lane]) <= 0) continue;
     candidate[lane] = true;
     SetRay(&packet, lane, direction, 0, reach);
   }
@@ -268,18 +298,22 @@ FrameTruth ComputeTruth(const RayScene& wall, const Camera<double>& camera, cons
     truth.seen_after = ImageF(width, height, 1, kNothing);
   }
   if (extras.vertex_normals) truth.smooth_normal = truth.normal;
+  if (extras.rest) truth.rest_position = truth.position;
   const Eye eye(wall, camera, valid, world_from_camera);
   std::optional<Eye> previous, next;
-  if (world_from_previous) previous.emplace(wall, camera, valid, *world_from_previous);
-  if (extras.world_from_next) next.emplace(wall, camera, valid, *extras.world_from_next);
+  const RayScene& before = extras.wall_before ? *extras.wall_before : wall;
+  const RayScene& after = extras.wall_after ? *extras.wall_after : wall;
+  if (world_from_previous) previous.emplace(before, camera, valid, *world_from_previous);
+  if (extras.world_from_next) next.emplace(after, camera, valid, *extras.world_from_next);
   ForEachBlock(camera, valid, world_from_camera, [&](const Block& block) {
     const Met met = Meet(eye, block);
     StoreGeometry(eye, block, met, &truth);
     if (extras.vertex_normals) {
       StoreSmoothNormal(eye, block, met, *extras.vertex_normals, &truth.smooth_normal);
     }
-    if (previous) StoreMotion(*previous, block, met, &truth.flow, &truth.seen_before);
-    if (next) StoreMotion(*next, block, met, &truth.flow_next, &truth.seen_after);
+    if (extras.rest) StoreRestPosition(eye, block, met, *extras.rest, &truth.rest_position);
+    if (previous) StoreMotion(eye, *previous, block, met, &truth.flow, &truth.seen_before);
+    if (next) StoreMotion(eye, *next, block, met, &truth.flow_next, &truth.seen_after);
     StoreOcclusion(eye, block, met, &truth);
   });
   return truth;

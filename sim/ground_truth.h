@@ -18,6 +18,7 @@ struct FrameTruth {
   ImageF smooth_normal;  // the same of the smooth wall that the triangles stand for: the vertices' normals,
                          // interpolated, on the side of `normal`
   ImageF position;       // mm, world axes
+  ImageF rest_position;  // the same of the wall at rest: the place moves with its face
   ImageF flow;  // px, this frame → the one before: where the place was seen there, minus where it is here
   ImageF seen_before;  // 1 where the frame before sees the same place, 0 where something hides it or it lies
                        // outside
@@ -32,6 +33,11 @@ inline constexpr double kDepthRange_mm = 100;
 struct TruthExtras {
   const Pose* world_from_next = nullptr;               // flow_next, seen_after
   const std::vector<Vec3d>* vertex_normals = nullptr;  // VertexNormals of the wall: smooth_normal
+  // Where the wall moves: it at the moments of the neighbours, and at rest (rest_position). All have the same
+  // faces, and flow follows the places of a face as it moves.
+  const RayScene* wall_before = nullptr;
+  const RayScene* wall_after = nullptr;
+  const Mesh* rest = nullptr;
 };
 
 // The ray is found in float and its distance computed in double. world_from_previous: the pose of the frame

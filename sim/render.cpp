@@ -11,6 +11,7 @@
 #include "common/parallel.h"
 #include "common/progress.h"
 #include "sim/face_visibility.h"
+#include "sim/geometry/moving_wall.h"
 #include "sim/ground_truth.h"
 #include "sim/surface_maps.h"
 
@@ -29,13 +30,14 @@ class Renderer {
   Renderer(const Scene& scene, const RenderOptions& options)
       : scene_(scene),
         options_(options),
-        wall_(scene.geometry.mesh),
-        vertex_normals_(scene.surface.coat || Wants("shading_normal") ? VertexNormals(scene.geometry.mesh)
-                                                                      : std::vector<Vec3d>()),
-        path_scene_{&wall_, &scene.surface, RandomBits(options.seed, kSurfaceSeed), &vertex_normals_},
+        walls_(scene.geometry, {scene.peristalsis, scene.surface.coat || Wants("shading_normal")}),
+        rest_anchor_(Bounds(scene.geometry.mesh).center()),
+        surface_seed_(RandomBits(options.seed, kSurfaceSeed)),
         camera_(scene.calibration.camera),
         fast_camera_(scene.calibration.camera),
-        valid_(ValidPixels(scene.calibration)) {
+        valid_(ValidPixels(scene.calibration)),
+        seen_(scene.geometry.mesh.faces.size(), 0) {
+    if (Wants("visibility")) visibility_.emplace(seen_.size());
     if (std::none_of(valid_.data.begin(), valid_.data.end(), [](uint8_t v) { return v != 0; })) {
       throw InputError("camera.mask: no pixel is left");
     }
@@ -74,6 +76,10 @@ class Renderer {
 
   bool WantsParts() const { return Wants("direct") || Wants("indirect") || Wants("glint"); }
 
+  PathScene PathSceneOf(const WallMoment& wall) const {
+    return {&wall.rays, &scene_.surface, surface_seed_, &wall.vertex_normals};
+  }
+
   View ViewOf(int frame, const Camera<float>& camera, const Image8& valid) const {
     return {&camera, &valid, scene_.world_from_camera[frame], &scene_.calibration.light, nullptr};
   }
@@ -100,8 +106,8 @@ class Renderer {
     std::vector<double> brightness;
     for (int frame = 0; frame < last_; ++frame) {
       Film film;
-      const PathCount count = RenderFrame(path_scene_, ViewOf(frame, fast_camera, valid), path,
-                                          RandomBits(options_.seed, kMeterSeed), frame, false, &film);
+      const PathCount count = RenderFrame(PathSceneOf(*walls_.At(frame)), ViewOf(frame, fast_camera, valid),
+                                          path, RandomBits(options_.seed, kMeterSeed), frame, false, &film);
       NoteFailure(frame, " of the metering picture", count.failure);
       brightness.push_back(MeterBrightness(scene_.calibration.response, film.radiance, valid, camera));
     }
@@ -109,6 +115,7 @@ class Renderer {
   }
 
   void RenderOne(int frame, double gain, const ImageF& vignetting) {
+    const std::shared_ptr<const WallMoment> wall = walls_.At(frame);
     View view = ViewOf(frame, fast_camera_, valid_);
     std::optional<CameraMotion> motion;
     if (scene_.sensor.shutter) {
@@ -116,7 +123,7 @@ class Renderer {
     }
     Film film;
     const PathCount count =
-        RenderFrame(path_scene_, view, scene_.path, options_.seed, frame, WantsParts(), &film);
+        RenderFrame(PathSceneOf(*wall), view, scene_.path, options_.seed, frame, WantsParts(), &film);
     // Without a coat there is no glint.
     if (Wants("glint") && film.glint.empty()) film.glint = ImageF(valid_.width, valid_.height, 3);
     result_.samples += count.samples;
@@ -125,12 +132,42 @@ class Renderer {
     WriteImage(FrameFile(options_.folder, frame, "color.png"),
                Photograph(frame, gain, film.radiance, vignetting));
     if (scene_.truth.c3vd || !scene_.truth.exact.empty()) {
-      const Pose* previous = frame > 0 ? &scene_.world_from_camera[frame - 1] : nullptr;
-      const FrameTruth truth =
-          ComputeTruth(wall_, camera_, valid_, scene_.world_from_camera[frame], previous, ExtrasOf(frame));
+      const FrameTruth truth = TruthOf(frame, *wall);
       if (scene_.truth.c3vd) WriteC3vd(frame, truth);
       if (!scene_.truth.exact.empty()) WriteExact(frame, film, truth);
+      if (Wants("mesh")) WriteMesh(options_.folder / "exact" / ExactName(frame, "_mesh.ply"), wall->mesh());
     }
+    NoteSeen(frame, *wall);
+  }
+
+  FrameTruth TruthOf(int frame, const WallMoment& wall) {
+    const std::vector<Pose>& poses = scene_.world_from_camera;
+    const Pose* previous = frame > 0 ? &poses[frame - 1] : nullptr;
+    TruthExtras extras;
+    const bool has_next = frame + 1 < static_cast<int>(poses.size());
+    if (has_next && (Wants("flow_next") || Wants("seen_after"))) extras.world_from_next = &poses[frame + 1];
+    if (Wants("shading_normal")) extras.vertex_normals = &wall.vertex_normals;
+    std::shared_ptr<const WallMoment> before, after;
+    if (walls_.moves()) {
+      extras.rest = &scene_.geometry.mesh;
+      if (previous) extras.wall_before = &(before = walls_.At(frame - 1))->rays;
+      if (extras.world_from_next) extras.wall_after = &(after = walls_.At(frame + 1))->rays;
+    }
+    return ComputeTruth(wall.rays, camera_, valid_, poses[frame], previous, extras);
+  }
+
+  // The faces that the frames see. How often and how well is noted if it is asked for: it takes a look at
+  // every face from every frame.
+  void NoteSeen(int frame, const WallMoment& wall) {
+    const Pose& pose = scene_.world_from_camera[frame];
+    if (visibility_) std::fill(seen_.begin(), seen_.end(), uint8_t{0});
+    MarkObserved(wall.rays, camera_, valid_, pose, &seen_);
+    if (visibility_) AddFrame(wall.mesh(), pose.translation(), seen_, &*visibility_);
+  }
+
+  std::vector<bool> Observed() const {
+    if (!visibility_) return std::vector<bool>(seen_.begin(), seen_.end());
+    return std::vector<bool>(visibility_->frames.begin(), visibility_->frames.end());
   }
 
   // What lens, sensor and recorder make of a frame.
@@ -173,16 +210,6 @@ class Renderer {
       WriteImage(FrameFile(options_.folder, frame, "flow.tiff"), EncodeFlow(truth.flow));
   }
 
-  TruthExtras ExtrasOf(int frame) const {
-    TruthExtras extras;
-    const bool has_next = frame + 1 < static_cast<int>(scene_.world_from_camera.size());
-    if (has_next && (Wants("flow_next") || Wants("seen_after"))) {
-      extras.world_from_next = &scene_.world_from_camera[frame + 1];
-    }
-    if (Wants("shading_normal")) extras.vertex_normals = &vertex_normals_;
-    return extras;
-  }
-
   void WriteExact(int frame, const Film& film, const FrameTruth& truth) const {
     std::vector<std::string> names;
     std::vector<ImageF> images;
@@ -196,14 +223,13 @@ class Renderer {
     add("direct", film.direct, rgb);
     add("indirect", film.indirect, rgb);
     add("glint", film.glint, rgb);
-    const uint64_t seed = path_scene_.surface_seed;
-    if (Wants("albedo")) add("albedo", AlbedoMap(scene_.surface, seed, wall_, truth), rgb);
+    if (Wants("albedo")) add("albedo", AlbedoMap(scene_.surface, surface_seed_, rest_anchor_, truth), rgb);
     add("z", truth.z, one);
     add("distance", truth.distance, one);
     add("normal", truth.normal, xyz);
     if (Wants("shading_normal")) {
       const Pose& pose = scene_.world_from_camera[frame];
-      add("shading_normal", ShadingNormalMap(scene_.surface, seed, wall_, pose, truth), xyz);
+      add("shading_normal", ShadingNormalMap(scene_.surface, surface_seed_, rest_anchor_, pose, truth), xyz);
     }
     add("position", truth.position, xyz);
     add("flow", truth.flow, {"X", "Y"});
@@ -219,13 +245,13 @@ class Renderer {
       }
       channel += image.channels;
     }
-    if (all.channels > 0) WriteExr(options_.folder / "exact" / ExactName(frame), all, names);
+    if (all.channels > 0) WriteExr(options_.folder / "exact" / ExactName(frame, ".exr"), all, names);
   }
 
-  static std::string ExactName(int frame) {
-    char name[32];
-    std::snprintf(name, sizeof(name), "%04d.exr", frame);
-    return name;
+  static std::string ExactName(int frame, const std::string& ending) {
+    char number[16];
+    std::snprintf(number, sizeof(number), "%04d", frame);
+    return number + ending;
   }
 
   void WriteSequence(const std::vector<double>& gains) const {
@@ -242,31 +268,10 @@ class Renderer {
       sequence.frames.push_back(entry);
     }
     WriteCoverageMesh(options_.folder / "coverage_mesh.obj", mesh, Observed());
+    if (visibility_) WriteFaceVisibility(options_.folder / "exact" / "visibility.ply", mesh, *visibility_);
     sequence.ground_truth_mesh = options_.folder / "mesh.ply";
     WriteMesh(sequence.ground_truth_mesh, mesh);
     WriteSequenceHeader(sequence);
-  }
-
-  // The faces that the frames see. How often and how well is written if it is asked for: it takes a look at
-  // every face from every frame.
-  std::vector<bool> Observed() const {
-    const Mesh& mesh = scene_.geometry.mesh;
-    std::vector<uint8_t> seen(mesh.faces.size(), 0);
-    if (!Wants("visibility")) {
-      for (int frame = options_.first_frame; frame < last_; ++frame) {
-        MarkObserved(wall_, camera_, valid_, scene_.world_from_camera[frame], &seen);
-      }
-      return std::vector<bool>(seen.begin(), seen.end());
-    }
-    FaceVisibility visibility(mesh.faces.size());
-    for (int frame = options_.first_frame; frame < last_; ++frame) {
-      const Pose& pose = scene_.world_from_camera[frame];
-      std::fill(seen.begin(), seen.end(), uint8_t{0});
-      MarkObserved(wall_, camera_, valid_, pose, &seen);
-      AddFrame(mesh, pose.translation(), seen, &visibility);
-    }
-    WriteFaceVisibility(options_.folder / "exact" / "visibility.ply", mesh, visibility);
-    return std::vector<bool>(visibility.frames.begin(), visibility.frames.end());
   }
 
   // Whatever an earlier render left would be taken for this one's: frames that this one doesn't have, truth
@@ -284,7 +289,7 @@ class Renderer {
       std::filesystem::remove(folder / name);
     }
     static const std::regex kFrameFile(
-        R"(\d{4,}(_(color|occlusion)\.png|_(depth|normals|flow)\.tiff|\.exr))");
+        R"(\d{4,}(_(color|occlusion)\.png|_(depth|normals|flow)\.tiff|_mesh\.ply|\.exr))");
     for (const auto& place : {folder, folder / "exact"}) {
       if (!std::filesystem::is_directory(place)) continue;
       std::vector<std::filesystem::path> old;
@@ -297,12 +302,14 @@ class Renderer {
 
   const Scene& scene_;
   RenderOptions options_;
-  RayScene wall_;
-  std::vector<Vec3d> vertex_normals_;  // empty without a coat
-  PathScene path_scene_;
+  MovingWall walls_;
+  Vec3d rest_anchor_;
+  uint64_t surface_seed_;
   Camera<double> camera_;
   Camera<float> fast_camera_;
   Image8 valid_;
+  std::vector<uint8_t> seen_;  // of the faces: by any frame so far, with visibility by the last
+  std::optional<FaceVisibility> visibility_;  // if it is asked for
   int last_;
   RenderResult result_;
 };

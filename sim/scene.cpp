@@ -5,7 +5,10 @@
 #include "common/calibration.h"
 #include "common/config.h"
 #include "common/error.h"
+#include "common/parallel.h"
 #include "common/random.h"
+#include "sim/geometry/clearance.h"
+#include "sim/geometry/moving_wall.h"
 #include "sim/trajectory/trajectory.h"
 
 namespace lumen {
@@ -86,6 +89,7 @@ TruthOptions ReadTruth(const ConfigTable& table) {
 
 std::vector<std::string> NameEffects(const Scene& scene) {
   std::vector<std::string> effects;
+  if (scene.peristalsis) effects.push_back("peristalsis");
   if (scene.path.bounces > 0) effects.push_back("interreflection");
   if (scene.surface.mottling) effects.push_back("mottling");
   if (scene.surface.vessels) effects.push_back("vessels");
@@ -104,19 +108,35 @@ std::vector<std::string> NameEffects(const Scene& scene) {
   return effects;
 }
 
+[[noreturn]] void RefuseFrame(const std::filesystem::path& file, size_t frame, const std::string& why) {
+  throw InputError(file.string() + ": frame " + std::to_string(frame) + ": " + why);
+}
+
 // A guide in the wall would light it from within.
-void CheckLightInLumen(const Scene& scene, const std::filesystem::path& file) {
-  const RayScene wall(scene.geometry.mesh);
+bool LightBehindWall(const Light& light, const Pose& world_from_camera, const RayScene& wall) {
+  const Vec3f from = wall.ToLocal(world_from_camera.translation());
+  return std::any_of(light.sources.begin(), light.sources.end(), [&](const LightSource& source) {
+    return !source.position.isZero(0) &&
+           wall.Occluded(from, wall.ToLocal(world_from_camera * source.position) - from, 0, 1);
+  });
+}
+
+// The trajectory has been found clear of the wall at rest.
+void CheckEndoscopeInLumen(const Scene& scene, const std::filesystem::path& file) {
+  MovingWall walls(scene.geometry, {scene.peristalsis});
   for (size_t frame = 0; frame < scene.world_from_camera.size(); ++frame) {
     const Pose& pose = scene.world_from_camera[frame];
-    for (const LightSource& source : scene.calibration.light.sources) {
-      if (source.position.isZero(0)) continue;
-      const Vec3f from = wall.ToLocal(pose.translation());
-      if (wall.Occluded(from, wall.ToLocal(pose * source.position) - from, 0, 1)) {
-        throw InputError(file.string() + ": frame " + std::to_string(frame) +
-                         ": a light source lies behind the wall; " +
-                         "keep the camera farther from it (trajectory.clearance_mm)");
-      }
+    const auto wall = walls.At(static_cast<int>(frame));
+    if (walls.moves() && !Clearance(wall->mesh()).Encloses(pose.translation())) {
+      RefuseFrame(file, frame,
+                  "the contracted wall has passed the camera; keep it nearer to the centreline or lower "
+                  "peristalsis.amplitude");
+    }
+    if (LightBehindWall(scene.calibration.light, pose, wall->rays)) {
+      RefuseFrame(file, frame,
+                  std::string("a light source lies behind the wall; keep the camera farther from it "
+                              "(trajectory.clearance_mm)") +
+                      (walls.moves() ? " or lower peristalsis.amplitude" : ""));
     }
   }
 }
@@ -125,9 +145,9 @@ void CheckLightInLumen(const Scene& scene, const std::filesystem::path& file) {
 
 const std::vector<std::string>& ExactChannels() {
   static const std::vector<std::string> channels = {
-      "radiance", "direct",      "indirect",  "glint",          "albedo",
-      "z",        "distance",    "normal",    "shading_normal", "position",
-      "flow",     "seen_before", "flow_next", "seen_after",     "visibility"};
+      "radiance",  "direct",     "indirect",       "glint",    "albedo", "z",
+      "distance",  "normal",     "shading_normal", "position", "flow",   "seen_before",
+      "flow_next", "seen_after", "visibility",     "mesh"};
   return channels;
 }
 
@@ -149,11 +169,12 @@ Scene ReadScene(const std::filesystem::path& file, const std::vector<std::string
   }
   if (const auto sensor = root.Optional("sensor")) scene.sensor = ReadSensor(*sensor);
   if (const auto truth = root.Optional("truth")) scene.truth = ReadTruth(*truth);
+  if (const auto table = root.Optional("peristalsis")) scene.peristalsis = ReadPeristalsis(*table);
   scene.geometry = BuildGeometry(root.Table("geometry"), RandomBits(seed, kGeometrySeed));
   scene.world_from_camera =
       BuildTrajectory(root.Table("trajectory"), scene.geometry, RandomBits(seed, kTrajectorySeed));
   config.RejectUnknown();
-  CheckLightInLumen(scene, file);
+  CheckEndoscopeInLumen(scene, file);
   scene.effects = NameEffects(scene);
   return scene;
 }

@@ -8,6 +8,7 @@
 
 #include "common/sequence.h"
 #include "sim/geometry/geometry.h"
+#include "sim/geometry/peristalsis.h"
 #include "sim/imaging/chromatic_aberration.h"
 #include "sim/imaging/path.h"
 #include "sim/imaging/sensor.h"
@@ -16,13 +17,15 @@
 namespace lumen {
 
 struct TruthOptions {
-  bool c3vd = true;                // depth, normals, flow, occlusion in C3VD's encodings
-  std::vector<std::string> exact;  // channels of exact/NNNN.exr; "visibility": exact/visibility.ply
+  bool c3vd = true;  // depth, normals, flow, occlusion in C3VD's encodings
+  // Channels of exact/NNNN.exr; "visibility": exact/visibility.ply; "mesh": exact/NNNN_mesh.ply.
+  std::vector<std::string> exact;
 };
 
 struct Scene {
   Calibration calibration;
-  Geometry geometry;
+  Geometry geometry;  // at rest
+  std::optional<Peristalsis> peristalsis;
   std::vector<Pose> world_from_camera;
   Surface surface;
   PathOptions path;

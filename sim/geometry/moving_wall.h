@@ -1,0 +1,57 @@
+// The wall at each frame's moment, ready for rays.
+#pragma once
+
+#include <list>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "common/mesh.h"
+#include "common/ray_scene.h"
+#include "sim/geometry/geometry.h"
+#include "sim/geometry/peristalsis.h"
+
+namespace lumen {
+
+// One moment's. Its faces are those of the wall at rest, in their order.
+struct WallMoment {
+  explicit WallMoment(const Mesh& rest) : rays(rest) {}
+  explicit WallMoment(std::unique_ptr<const Mesh> moved) : moved(std::move(moved)), rays(*this->moved) {}
+
+  std::unique_ptr<const Mesh> moved;  // none where the wall is at rest
+  RayScene rays;
+  std::vector<Vec3d> vertex_normals;  // empty if they aren't asked for
+
+  const Mesh& mesh() const { return rays.mesh(); }
+};
+
+// Without an effect that moves it, the wall is the geometry's own mesh, built once.
+class MovingWall {
+ public:
+  struct Options {
+    std::optional<Peristalsis> peristalsis;
+    bool vertex_normals = false;
+  };
+  // The geometry is referred to: it must outlive this and what At gives.
+  MovingWall(const Geometry& geometry, const Options& options);
+
+  bool moves() const { return peristaltic_.has_value(); }
+
+  // The wall when a frame is taken. The last few that were asked for are kept. Not to be called by two
+  // threads at a time.
+  std::shared_ptr<const WallMoment> At(int frame);
+
+ private:
+  std::shared_ptr<const WallMoment> Build(int frame) const;
+
+  const Geometry& geometry_;
+  bool vertex_normals_;
+  std::optional<PeristalticWall> peristaltic_;
+  struct Kept {
+    int frame;
+    std::shared_ptr<const WallMoment> wall;
+  };
+  std::list<Kept> kept_;  // the last used first
+};
+
+}  // namespace lumen
