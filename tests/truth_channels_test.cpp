@@ -97,10 +97,12 @@ TEST(TruthChannels, ShadingNormalFollowsTheRelief) {
   const SphereView view(160);
   const CoatOptions options{1.37, 0.2, 2, 0.2, std::nullopt};
   Surface surface;
-  EXPECT_EQ(ShadingNormalMap(surface, kSeed, view.wall, view.world_from_camera, view.truth).data.size(),
-            view.truth.smooth_normal.data.size());
+  EXPECT_EQ(
+      ShadingNormalMap(surface, kSeed, view.wall.anchor(), view.world_from_camera, view.truth).data.size(),
+      view.truth.smooth_normal.data.size());
   surface.coat.emplace(options);
-  const ImageF found = ShadingNormalMap(surface, kSeed, view.wall, view.world_from_camera, view.truth);
+  const ImageF found =
+      ShadingNormalMap(surface, kSeed, view.wall.anchor(), view.world_from_camera, view.truth);
   const auto height = [&](const Vec3d& place) {
     const Vec3f p = (place / options.relief_mm).cast<float>();
     return options.relief_height_mm *
