@@ -26,7 +26,7 @@ constexpr double kIntensity = 500;
 
 TEST(HardCases, BlackWallSendsNothing) {
   for (const bool vessels : {false, true}) {
-    Stage stage(test::Sphere(20, 30), CentredPinhole(24, 18, 12), kIntensity);
+    Stage stage(test::Globe(20, 30), CentredPinhole(24, 18, 12), kIntensity);
     stage.surface.albedo.setZero();
     if (vessels) stage.surface.vessels.emplace();
     stage.options = {4, 6, 0};
@@ -38,7 +38,7 @@ TEST(HardCases, BlackWallSendsNothing) {
 // one on may end no path, for none has lost anything.
 TEST(HardCases, WhiteWallLosesNothing) {
   constexpr int kBounces = 40;
-  Stage stage(test::Sphere(20, 90), CentredPinhole(16, 12, 8), kIntensity);
+  Stage stage(test::Globe(20, 90), CentredPinhole(16, 12, 8), kIntensity);
   stage.surface.albedo.setOnes();
   stage.world_from_camera.translation() = Vec3d(4, -6, 3);
   stage.options = {4, kBounces, 0};
@@ -138,7 +138,7 @@ TEST(HardCases, GammaAtItsEnds) {
 // EndoMapper's polynomial folds back at θ_d = 1.0572: the pixels beyond have no ray, no light and no truth;
 // those within have all three.
 TEST(HardCases, PixelsAtAndBeyondTheFold) {
-  Stage stage(test::Sphere(20, 30), Resized(EndomapperIntrinsics(), 180, 135), kIntensity);
+  Stage stage(test::Globe(20, 30), Resized(EndomapperIntrinsics(), 180, 135), kIntensity);
   stage.options = {4, 2, 9};
   const FrameTruth truth = ComputeTruth(stage.wall, Camera<double>(stage.intrinsics), stage.valid,
                                         stage.world_from_camera, nullptr);
@@ -185,7 +185,7 @@ TEST(HardCases, FrameOfOnePixel) {
 TEST(HardCases, FrameOf8192Squared) {
   constexpr int kSide = 8192;
   const test::ScratchFolder scratch;
-  Stage stage(test::Sphere(20, 300), CentredPinhole(kSide, kSide, 4096), kIntensity);
+  Stage stage(test::Globe(20, 300), CentredPinhole(kSide, kSide, 4096), kIntensity);
   std::fill(stage.valid.data.begin(), stage.valid.data.end(), uint8_t{0});
   std::vector<std::pair<int, int>> pixels;
   for (int y = 0; y < kSide; y += 431) {

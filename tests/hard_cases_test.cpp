@@ -64,7 +64,7 @@ TEST(HardCases, CameraOnTheWall) {
 // On it to the last bit, light and eye: nothing has a direction, and nothing is made up of it.
 TEST(HardCases, CameraInTheWall) {
   for (const bool coat : {false, true}) {
-    Stage stage(test::Sphere(20, 30), CentredPinhole(16, 16, 8), kIntensity);
+    Stage stage(test::Globe(20, 30), CentredPinhole(16, 16, 8), kIntensity);
     if (coat) stage.surface.coat.emplace(CoatOptions{});
     stage.options = {4, 3, 1};
     for (const int face : {7, 450, 1333}) {
@@ -106,7 +106,7 @@ TEST(HardCases, GrazingTo8999) {
 // by way of other walls, be the fold ever so thin.
 TEST(HardCases, ThinFoldsLetNothingThrough) {
   for (const double thickness_mm : {0.2, 0.05, 0.005}) {
-    Mesh mesh = test::Sphere(20, 40);
+    Mesh mesh = test::Globe(20, 40);
     AddPlate(&mesh, -25, 25, -25, 25, -thickness_mm / 2);
     AddPlate(&mesh, -25, 25, -25, 25, thickness_mm / 2);
     Stage stage(mesh, CentredPinhole(48, 36, 20), kIntensity);
@@ -192,7 +192,7 @@ void ExpectSamePicture(const Stage& expected, const Stage& found, double toleran
 }
 
 TEST(HardCases, FarFromTheOrigin) {
-  const Mesh mesh = test::Sphere(20, 40);
+  const Mesh mesh = test::Globe(20, 40);
   const CameraIntrinsics camera = CentredPinhole(48, 36, 24);
   Stage near(mesh, camera, kIntensity);
   near.world_from_camera.translation() = Vec3d(3, -2, 1);
@@ -217,7 +217,7 @@ TEST(HardCases, FarFromTheOrigin) {
 TEST(HardCases, AnyUnit) {
   const CameraIntrinsics camera = CentredPinhole(48, 36, 24);
   const auto scaled = [&](double scale) {
-    auto stage = std::make_unique<Stage>(test::Sphere(20 * scale, 40), camera, kIntensity * scale * scale);
+    auto stage = std::make_unique<Stage>(test::Globe(20 * scale, 40), camera, kIntensity * scale * scale);
     stage->world_from_camera.translation() = scale * Vec3d(3, -2, 1);
     stage->light.sources[0].position = scale * Vec3d(2, 1, 0);
     return stage;
@@ -263,7 +263,7 @@ TEST(HardCases, GuideInTheWallIsRefusedByFrame) {
 // Five million triangles see what the smooth sphere sees, to the angle between them.
 TEST(HardCases, FiveMillionTriangles) {
   constexpr int kRings = 1120;
-  Stage stage(test::Sphere(20, kRings), CentredPinhole(32, 24, 16), kIntensity);
+  Stage stage(test::Globe(20, kRings), CentredPinhole(32, 24, 16), kIntensity);
   EXPECT_GT(stage.mesh.faces.size(), 5000000u);
   stage.world_from_camera.translation() = Vec3d(3, -2, 1);
   const Film film = stage.Render();

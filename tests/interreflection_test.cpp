@@ -103,7 +103,7 @@ TEST(Interreflection, TubesLaterBouncesAreTheQuadratures) { ExpectTube(2.77, 0.7
 // place, wherever the light is. Only Russian roulette ends a path here.
 void ExpectSphere(double albedo, int samples, double error_bound) {
   constexpr double kRadius_mm = 20, kIntensity = 500;
-  Stage stage(test::Sphere(kRadius_mm, 90), CentredPinhole(16, 12, 8), kIntensity);
+  Stage stage(test::Globe(kRadius_mm, 90), CentredPinhole(16, 12, 8), kIntensity);
   stage.surface.albedo = Vec3d::Constant(albedo);
   stage.world_from_camera =
       Eigen::Translation3d(4, -6, 3) * Eigen::AngleAxisd(0.4, Vec3d(1, 2, 0.5).normalized());

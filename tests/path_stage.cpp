@@ -29,7 +29,7 @@ Mesh Lathe(int along, int around, const std::function<Vec3d(double, double)>& pl
   return mesh;
 }
 
-Mesh Sphere(double radius_mm, int rings) {
+Mesh Globe(double radius_mm, int rings) {
   return Lathe(rings, 2 * rings, [=](double along, double turn) {
     const double polar = kPi * along;
     return Vec3d(radius_mm *

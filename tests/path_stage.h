@@ -16,8 +16,8 @@ CameraIntrinsics CentredPinhole(int width, int height, double focal_px);
 
 // Places of a surface over the grid (along 0…1 × around 0…2π), joined to triangles.
 Mesh Lathe(int along, int around, const std::function<Vec3d(double, double)>& place);
-// Around the origin.
-Mesh Sphere(double radius_mm, int rings);
+// A sphere of meridians and parallels around the origin.
+Mesh Globe(double radius_mm, int rings);
 // Around the z axis, open at ±half_length_mm.
 Mesh Tube(double radius_mm, double half_length_mm, int along, int around);
 // A rectangle across z.
