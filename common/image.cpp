@@ -200,13 +200,18 @@ void ReadImageSize(const fs::path& file, int* width, int* height) {
   *height = input->spec().height;
 }
 
-void DrawText(Image8* image, int x, int y, int size_px, const std::string& text, const uint8_t rgb[3]) {
+void DrawText(Image8* image, int x, int y, int size_px, const std::string& text, const Rgb8& color,
+              TextAlign align) {
   static const std::string font = FontFile();
   if (font.empty() || image->empty()) return;
   const OIIO::ImageSpec spec(image->width, image->height, image->channels, TypeDesc::UINT8);
   OIIO::ImageBuf buffer(spec, image->data.data());
-  const float color[3] = {rgb[0] / 255.0f, rgb[1] / 255.0f, rgb[2] / 255.0f};
-  OIIO::ImageBufAlgo::render_text(buffer, x, y, text, size_px, font, color);
+  const float ink[3] = {color[0] / 255.0f, color[1] / 255.0f, color[2] / 255.0f};
+  using AlignX = OIIO::ImageBufAlgo::TextAlignX;
+  const AlignX align_x = align == TextAlign::kLeft     ? AlignX::Left
+                         : align == TextAlign::kCentre ? AlignX::Center
+                                                       : AlignX::Right;
+  OIIO::ImageBufAlgo::render_text(buffer, x, y, text, size_px, font, ink, align_x);
 }
 
 }  // namespace lumen

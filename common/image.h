@@ -1,6 +1,7 @@
 // Images as arrays of pixels, and their files (PNG, TIFF, EXR) through OpenImageIO.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <filesystem>
 #include <string>
@@ -25,6 +26,7 @@ struct Image {
   const T* Pixel(int x, int y) const { return data.data() + (size_t(y) * width + x) * channels; }
 };
 
+using Rgb8 = std::array<uint8_t, 3>;
 using Image8 = Image<uint8_t>;
 using Image16 = Image<uint16_t>;
 using ImageF = Image<float>;
@@ -51,8 +53,11 @@ ImageF ReadExr(const std::filesystem::path& file, std::vector<std::string>* chan
 // Width and height without reading the pixels. Throws InputError.
 void ReadImageSize(const std::filesystem::path& file, int* width, int* height);
 
-// Writes text into an 8-bit RGB image, its base line starting at (x, y). Does nothing where the machine has
-// no font.
-void DrawText(Image8* image, int x, int y, int size_px, const std::string& text, const uint8_t rgb[3]);
+enum class TextAlign { kLeft, kCentre, kRight };
+
+// Writes text (UTF-8) into an 8-bit RGB image: its base line at height y, its left end, middle or right end
+// at x. Does nothing where the machine has no font.
+void DrawText(Image8* image, int x, int y, int size_px, const std::string& text, const Rgb8& color,
+              TextAlign align = TextAlign::kLeft);
 
 }  // namespace lumen

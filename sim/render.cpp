@@ -7,12 +7,12 @@
 
 #include "common/error.h"
 #include "common/files.h"
-#include "common/jpeg.h"
 #include "common/parallel.h"
 #include "common/progress.h"
 #include "sim/face_visibility.h"
 #include "sim/geometry/moving_wall.h"
 #include "sim/ground_truth.h"
+#include "sim/photographer.h"
 #include "sim/surface_maps.h"
 
 namespace lumen {
@@ -23,7 +23,6 @@ namespace {
 constexpr int kMeterReduction = 8;
 constexpr int kMeterSamples = 4;
 constexpr uint64_t kMeterSeed = 0x6d65746572ull;
-constexpr uint64_t kSurfaceSeed = 0x77616c6cull;
 
 class Renderer {
  public:
@@ -32,10 +31,11 @@ class Renderer {
         options_(options),
         walls_(scene.geometry, {scene.peristalsis, scene.surface.coat || Wants("shading_normal")}),
         rest_anchor_(Bounds(scene.geometry.mesh).center()),
-        surface_seed_(RandomBits(options.seed, kSurfaceSeed)),
+        surface_seed_(SurfaceSeed(options.seed)),
         camera_(scene.calibration.camera),
         fast_camera_(scene.calibration.camera),
         valid_(ValidPixels(scene.calibration)),
+        photographer_(scene, valid_, options.seed),
         seen_(scene.geometry.mesh.faces.size(), 0) {
     if (Wants("visibility")) visibility_.emplace(seen_.size());
     if (std::none_of(valid_.data.begin(), valid_.data.end(), [](uint8_t v) { return v != 0; })) {
@@ -56,9 +56,8 @@ class Renderer {
     RemoveOldSequence();
     if (!scene_.truth.exact.empty()) CreateFolder(options_.folder / "exact");
     const std::vector<double> gains = Gains();
-    const ImageF vignetting = VignettingMap(scene_.calibration.response, camera_);
     for (int frame = options_.first_frame; frame < last_; ++frame) {
-      RenderOne(frame, gains[frame], vignetting);
+      RenderOne(frame, gains[frame]);
       progress.Update(double(frame + 1 - options_.first_frame) / (last_ - options_.first_frame));
     }
     WriteSequence(gains);
@@ -114,7 +113,7 @@ class Renderer {
     return RunAutoGain(*scene_.sensor.auto_gain, scene_.calibration.response, brightness);
   }
 
-  void RenderOne(int frame, double gain, const ImageF& vignetting) {
+  void RenderOne(int frame, double gain) {
     const std::shared_ptr<const WallMoment> wall = walls_.At(frame);
     View view = ViewOf(frame, fast_camera_, valid_);
     std::optional<CameraMotion> motion;
@@ -130,7 +129,7 @@ class Renderer {
     result_.rays += count.rays;
     NoteFailure(frame, "", count.failure);
     WriteImage(FrameFile(options_.folder, frame, "color.png"),
-               Photograph(frame, gain, film.radiance, vignetting));
+               photographer_.Photograph(frame, gain, film.radiance));
     if (scene_.truth.c3vd || !scene_.truth.exact.empty()) {
       const FrameTruth truth = TruthOf(frame, *wall);
       if (scene_.truth.c3vd) WriteC3vd(frame, truth);
@@ -168,28 +167,6 @@ class Renderer {
   std::vector<bool> Observed() const {
     if (!visibility_) return std::vector<bool>(seen_.begin(), seen_.end());
     return std::vector<bool>(visibility_->frames.begin(), visibility_->frames.end());
-  }
-
-  // What lens, sensor and recorder make of a frame.
-  Image8 Photograph(int frame, double gain, const ImageF& radiance, const ImageF& vignetting) const {
-    if (!scene_.chromatic_aberration) return Record(frame, gain, radiance, vignetting);
-    const ImageF dispersed =
-        Disperse(*scene_.chromatic_aberration, scene_.calibration.camera, radiance, valid_);
-    return Record(frame, gain, dispersed, vignetting);
-  }
-
-  Image8 Record(int frame, double gain, const ImageF& radiance, const ImageF& vignetting) const {
-    const Image8 developed = Expose(frame, gain, radiance, vignetting);
-    return scene_.sensor.jpeg ? ThroughJpeg(developed, scene_.sensor.jpeg->quality) : developed;
-  }
-
-  Image8 Expose(int frame, double gain, const ImageF& radiance, const ImageF& vignetting) const {
-    const Response& response = scene_.calibration.response;
-    if (!scene_.sensor.noise) return Develop(response, gain, radiance, vignetting, valid_);
-    const ImageF signal =
-        NoisySignal(*scene_.sensor.noise, radiance, vignetting, valid_, options_.seed, frame);
-    const ImageF no_more_vignetting(signal.width, signal.height, 1, 1.0f);
-    return Develop(response, gain, signal, no_more_vignetting, valid_);
   }
 
   void NoteFailure(int frame, const std::string& picture, const Failure& failure) {
@@ -308,6 +285,7 @@ class Renderer {
   Camera<double> camera_;
   Camera<float> fast_camera_;
   Image8 valid_;
+  Photographer photographer_;
   std::vector<uint8_t> seen_;  // of the faces: by any frame so far, with visibility by the last
   std::optional<FaceVisibility> visibility_;  // if it is asked for
   int last_;
@@ -315,6 +293,8 @@ class Renderer {
 };
 
 }  // namespace
+
+uint64_t SurfaceSeed(uint64_t seed) { return RandomBits(seed, 0x77616c6cull); }
 
 RenderResult Render(const Scene& scene, const RenderOptions& options) {
   return Renderer(scene, options).Run();

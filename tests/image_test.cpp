@@ -186,7 +186,7 @@ TEST(Image, SamePixelsGiveTheSameBytes) {
 
 TEST(Image, TextIsDrawnWhereAndInTheColourAsked) {
   Image8 image(80, 30, 3, 7);
-  const uint8_t red[3] = {255, 0, 0};
+  const Rgb8 red = {255, 0, 0};
   DrawText(&image, 10, 25, 20, "MM", red);
   int drawn = 0, outside = 0;
   for (int y = 0; y < image.height; ++y) {

@@ -1,13 +1,11 @@
 // Colours for numbers, as in the paper's figures.
 #pragma once
 
-#include <array>
-#include <cstdint>
 #include <vector>
 
-namespace lumen {
+#include "common/image.h"
 
-using Rgb8 = std::array<uint8_t, 3>;
+namespace lumen {
 
 inline constexpr Rgb8 kUnobservedGrey = {150, 150, 150};
 

@@ -10,13 +10,6 @@ namespace {
 constexpr int kGap = 12, kText = 16, kTitle = kText + 10, kBar = 18;
 constexpr Rgb8 kInk = {30, 30, 30};
 
-// A letter of the sans serif fonts at hand is about this wide, in units of the size.
-constexpr double kLetterWidth = 0.55;
-
-int TextWidth(const std::string& text, int size_px) {
-  return static_cast<int>(std::lround(kLetterWidth * size_px * static_cast<double>(text.size())));
-}
-
 void Paste(const Image8& from, int x0, int y0, Image8* to) {
   for (int y = 0; y < from.height; ++y) {
     std::copy_n(from.Pixel(0, y), size_t(from.width) * 3, to->Pixel(x0, y0 + y));
@@ -29,16 +22,12 @@ void DrawBar(const ColorBar& bar, int x0, int y0, int width, Image8* page) {
     for (int y = 0; y < kBar; ++y) std::copy_n(color.data(), 3, page->Pixel(x0 + x, y0 + y));
   }
   const int baseline = y0 + kBar + kText + 2;
-  DrawText(page, x0, baseline, kText, bar.low, kInk.data());
-  DrawCentred(page, x0 + width / 2, baseline, kText, bar.middle, kInk);
-  DrawText(page, x0 + width - TextWidth(bar.high, kText), baseline, kText, bar.high, kInk.data());
+  DrawText(page, x0, baseline, kText, bar.low, kInk);
+  DrawText(page, x0 + width / 2, baseline, kText, bar.middle, kInk, TextAlign::kCentre);
+  DrawText(page, x0 + width, baseline, kText, bar.high, kInk, TextAlign::kRight);
 }
 
 }  // namespace
-
-void DrawCentred(Image8* image, int x, int y, int size_px, const std::string& text, const Rgb8& color) {
-  DrawText(image, x - TextWidth(text, size_px) / 2, y, size_px, text, color.data());
-}
 
 Image8 Compose(const std::vector<Panel>& panels, int columns, const std::vector<ColorBar>& bars) {
   const int rows = (static_cast<int>(panels.size()) + columns - 1) / columns;
@@ -59,7 +48,7 @@ Image8 Compose(const std::vector<Panel>& panels, int columns, const std::vector<
     for (int column = 0; column < columns && row * columns + column < static_cast<int>(panels.size());
          ++column) {
       const Panel& panel = panels[row * columns + column];
-      DrawText(&page, x, y - 6, kText, panel.title, kInk.data());
+      DrawText(&page, x, y - 6, kText, panel.title, kInk);
       Paste(panel.image, x, y, &page);
       x += widths[column] + kGap;
     }

@@ -28,7 +28,4 @@ Image8 Compose(const std::vector<Panel>& panels, int columns, const std::vector<
 // number of channels.
 Image8 Scaled(const Image8& image, int width, int height);
 
-// Text whose middle is at x (by the font's mean width) on the baseline y.
-void DrawCentred(Image8* image, int x, int y, int size_px, const std::string& text, const Rgb8& color);
-
 }  // namespace lumen

@@ -88,7 +88,7 @@ Image8 InputPanel(const Sequence& sequence, int frame, int width, int height) {
   const SequenceFrame& source = sequence.frames[frame];
   if (!source.color.empty()) return Scaled(ReadColor(sequence, source), width, height);
   Image8 panel(width, height, 3);
-  DrawCentred(&panel, width / 2, height / 2, 16, "no colour file", {255, 255, 255});
+  DrawText(&panel, width / 2, height / 2, 16, "no colour file", {255, 255, 255}, TextAlign::kCentre);
   return panel;
 }
 

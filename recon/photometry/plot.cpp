@@ -4,8 +4,8 @@
 
 #include <numeric>
 
+#include "common/plot.h"
 #include "recon/evaluation/layout.h"
-#include "recon/photometry/chart.h"
 
 namespace lumen {
 namespace {
@@ -15,10 +15,10 @@ constexpr Rgb8 kDots = {30, 90, 170}, kFitted = {205, 40, 40}, kExpected = {150,
 // A bin in the middle of nowhere says more about its few places than about the light.
 constexpr double kLeastShare = 1e-4;
 
-ChartPoints Dots(const std::vector<Bin>& bins) {
+PlotSeries Dots(const std::vector<Bin>& bins) {
   int64_t count = 0;
   for (const Bin& bin : bins) count += bin.count;
-  ChartPoints points;
+  PlotSeries points;
   points.color = kDots;
   for (const Bin& bin : bins) {
     if (double(bin.count) < kLeastShare * double(count)) continue;
@@ -30,13 +30,14 @@ ChartPoints Dots(const std::vector<Bin>& bins) {
 }
 
 // Through the points' middle with the given slope, over their range.
-ChartPoints StraightLine(const ChartPoints& points, double slope, const Rgb8& color) {
+PlotSeries StraightLine(const PlotSeries& points, double slope, const Rgb8& color) {
   const double count = static_cast<double>(points.x.size());
   const double middle_x = std::accumulate(points.x.begin(), points.x.end(), 0.0) / count;
   const double middle_y = std::accumulate(points.y.begin(), points.y.end(), 0.0) / count;
-  ChartPoints line;
+  PlotSeries line;
   line.color = color;
   line.joined = true;
+  line.dots = false;
   for (double x : {points.x.front(), points.x.back()}) {
     line.x.push_back(x);
     line.y.push_back(middle_y + slope * (x - middle_x));
@@ -45,35 +46,46 @@ ChartPoints StraightLine(const ChartPoints& points, double slope, const Rgb8& co
 }
 
 // y = 0 over the points' range.
-ChartPoints ZeroLine(const ChartPoints& points) {
-  return {{points.x.front(), points.x.back()}, {0, 0}, {}, kExpected, true};
+PlotSeries ZeroLine(const PlotSeries& points) {
+  PlotSeries line;
+  line.x = {points.x.front(), points.x.back()};
+  line.y = {0, 0};
+  line.color = kExpected;
+  line.joined = true;
+  line.dots = false;
+  return line;
+}
+
+Panel Charted(const std::string& title, const std::string& x_label, std::vector<PlotSeries> series) {
+  return {title, ToImage(DrawPlot({"", {.label = x_label}, {}, std::move(series)}, kWidth, kHeight))};
 }
 
 Panel FactorPanel(const std::string& what, const std::string& x_label, const std::vector<Bin>& bins,
                   const Figure& figure, double sign) {
-  Chart chart = {x_label, {}};
-  const ChartPoints dots = Dots(bins);
+  std::vector<PlotSeries> series;
+  const PlotSeries dots = Dots(bins);
   if (!dots.x.empty()) {
-    chart.series = {StraightLine(dots, sign * figure.expected.value(), kExpected),
-                    StraightLine(dots, sign * figure.value, kFitted), dots};
+    series = {StraightLine(dots, sign * figure.expected.value(), kExpected),
+              StraightLine(dots, sign * figure.value, kFitted), dots};
   }
-  return {fmt::format("{}: {:.3f} +- {:.3f} (expected {:.4g})", what, figure.value, figure.standard_error,
-                      *figure.expected),
-          DrawChart(chart, kWidth, kHeight)};
+  return Charted(fmt::format("{}: {:.3f} ± {:.3f} (expected {:.4g})", what, figure.value,
+                             figure.standard_error, *figure.expected),
+                 x_label, std::move(series));
 }
 
 Panel ResidualPanel(const std::string& title, const std::string& x_label, const std::vector<Bin>& bins) {
-  const ChartPoints dots = Dots(bins);
-  Chart chart = {x_label, {}};
-  if (!dots.x.empty()) chart.series = {ZeroLine(dots), dots};
-  return {title, DrawChart(chart, kWidth, kHeight)};
+  const PlotSeries dots = Dots(bins);
+  std::vector<PlotSeries> series;
+  if (!dots.x.empty()) series = {ZeroLine(dots), dots};
+  return Charted(title, x_label, std::move(series));
 }
 
 Panel GainPanel(const Photometry& photometry) {
-  ChartPoints known, fitted;
+  PlotSeries known, fitted;
   fitted.color = kDots;
   known.color = kExpected;
   known.joined = true;
+  known.dots = false;
   for (int number : photometry.frame_numbers) {
     const Figure* figure = photometry.Find(GainFigureName(number));
     if (figure == nullptr) continue;
@@ -84,10 +96,8 @@ Panel GainPanel(const Photometry& photometry) {
     known.x.push_back(number);
     known.y.push_back(*figure->expected);
   }
-  if (fitted.x.empty())
-    return {"log gain: one frame has none to compare with", DrawChart({}, kWidth, kHeight)};
-  return {"log gain about its mean (grey: the sequence's own)",
-          DrawChart({"frame", {known, fitted}}, kWidth, kHeight)};
+  if (fitted.x.empty()) return Charted("log gain: one frame has none to compare with", "frame", {});
+  return Charted("log gain about its mean (grey: the sequence's own)", "frame", {known, fitted});
 }
 
 }  // namespace
