@@ -23,6 +23,7 @@ int main(int argc, char** argv) {
   lumen::AddLoop(&app);
   lumen::AddCheck(&app);
   lumen::AddPhotometry(&app);
+  lumen::AddCost(&app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -28,5 +28,6 @@ void AddEvaluate(CLI::App* app);
 void AddLoop(CLI::App* app);
 void AddCheck(CLI::App* app);
 void AddPhotometry(CLI::App* app);
+void AddCost(CLI::App* app);
 
 }  // namespace lumen

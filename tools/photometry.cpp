@@ -6,6 +6,7 @@
 #include "common/files.h"
 #include "common/progress.h"
 #include "recon/photometry/baseline.h"
+#include "recon/photometry/looks.h"
 #include "recon/photometry/plot.h"
 #include "recon/photometry/report.h"
 #include "tools/options.h"
@@ -16,8 +17,8 @@ namespace {
 namespace fs = std::filesystem;
 
 struct Arguments {
-  fs::path sequence, folder, baseline, new_baseline;
-  double errors = 4;
+  fs::path sequence, folder, baseline, new_baseline, like;
+  double errors = 4, tolerance = 0.25;
   bool light_at_camera = false;
   PhotometryOptions options;
 };
@@ -44,6 +45,23 @@ nlohmann::json Compare(const Photometry& photometry, const Arguments& arguments)
   return {{"file", arguments.baseline.string()}, {"compared", baseline.size()}, {"outside", outside}};
 }
 
+// How the sequence looks beside another one.
+nlohmann::json CompareWithOther(const Sequence& sequence, const Photometry& photometry,
+                                const Arguments& arguments) {
+  const Sequence other = ReadSequence(arguments.like);
+  const Looks own = LooksOf(sequence, photometry);
+  const Looks others = LooksOf(other, FitPhotometry(Observe(other, arguments.options), arguments.options));
+  const std::vector<LookDifference> differences = CompareLooks(own, others, arguments.tolerance);
+  std::cout << "\n" << ToTable(own, others, differences);
+  if (!arguments.folder.empty()) WriteImage(arguments.folder / "looks.png", LooksPicture(own, others));
+  nlohmann::json json = nlohmann::json::array();
+  for (const LookDifference& one : differences) {
+    json.push_back(
+        {{"figure", one.name}, {"value", one.first}, {"other", one.second}, {"alike", one.within}});
+  }
+  return json;
+}
+
 nlohmann::json Run(const Arguments& arguments, const CommonOptions& common) {
   // What is wrong with a baseline is said before the work.
   if (!arguments.baseline.empty()) ReadBaseline(arguments.baseline);
@@ -59,6 +77,7 @@ nlohmann::json Run(const Arguments& arguments, const CommonOptions& common) {
     WriteFile(arguments.folder / "photometry.json", result.dump(2) + "\n");
     Say("picture in " + arguments.folder.string());
   }
+  if (!arguments.like.empty()) result["like"] = CompareWithOther(sequence, photometry, arguments);
   if (!arguments.new_baseline.empty()) WriteBaseline(arguments.new_baseline, photometry, arguments.errors);
   if (arguments.baseline.empty()) return result;
   result["baseline"] = Compare(photometry, arguments);
@@ -79,7 +98,8 @@ void AddPhotometry(CLI::App* app) {
                                     "fits the photometric model to frames whose depth and normals are known",
                                     [=](const CommonOptions& common) { return Run(*arguments, common); });
   command->add_option("SEQ", arguments->sequence, "the sequence folder, C3VD's included")->required();
-  command->add_option("-o,--output", arguments->folder, "folder for photometry.png and photometry.json");
+  command->add_option("-o,--output", arguments->folder,
+                      "folder for photometry.png, photometry.json and looks.png");
   command->add_option("--baseline", arguments->baseline,
                       "intervals that the figures must stay in: exits 1 and names each that doesn't");
   command->add_option(
@@ -87,6 +107,12 @@ void AddPhotometry(CLI::App* app) {
       "make such a file from this run: each figure ± --errors standard errors; edit it freely");
   command
       ->add_option("--errors", arguments->errors, "half-width of --write-baseline's intervals (default: 4)")
+      ->check(CLI::PositiveNumber);
+  command->add_option("--like", arguments->like,
+                      "another sequence: how alike the two look, figure by figure; looks.png in -o");
+  command
+      ->add_option("--tolerance", arguments->tolerance,
+                   "how far a figure may be from --like's, in parts of it (default: 0.25)")
       ->check(CLI::PositiveNumber);
   command->add_flag("--light-at-camera", arguments->light_at_camera,
                     "take the light as one source in the camera's centre, along its axis");

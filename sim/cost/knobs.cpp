@@ -1,0 +1,77 @@
+#include "sim/cost/knobs.h"
+
+#include <algorithm>
+
+namespace lumen {
+namespace {
+
+// A setting a value and one for the scene's own value, from small to large; `set` puts a value into the
+// options.
+Knob NumberKnob(const std::string& name, bool biased, const PathOptions& own, std::vector<int> values,
+                int own_value, const std::function<void(int, PathOptions*)>& set,
+                const std::function<double(int)>& work) {
+  if (std::ranges::find(values, own_value) == values.end()) values.push_back(own_value);
+  std::ranges::sort(values);
+  Knob knob{name, biased, {}};
+  for (int value : values) {
+    KnobSetting setting{std::to_string(value), own, work(value), value == own_value};
+    set(value, &setting.options);
+    knob.settings.push_back(setting);
+  }
+  return knob;
+}
+
+}  // namespace
+
+std::vector<Knob> KnobsOf(const Scene& scene) {
+  const PathOptions& own = scene.path;
+  std::vector<Knob> knobs;
+  knobs.push_back(NumberKnob(
+      "samples", false, own, {1, 2, 4, 8, 16, 32, 64, 128, 256}, own.samples,
+      [](int n, PathOptions* options) { options->samples = n; },
+      [&](int n) { return double(n) / own.samples; }));
+  // Roulette begins with the bounce after those that are free of it.
+  if (own.bounces > 0) {
+    knobs.push_back(NumberKnob(
+        "roulette_after", false, own, {0, 1, 2, 4, own.bounces}, std::min(own.roulette_after, own.bounces),
+        [](int n, PathOptions* options) { options->roulette_after = n; }, [](int) { return 1.0; }));
+  }
+  knobs.push_back(NumberKnob(
+      "bounces", true, own, {0, 1, 2, 3, 5, 8, 16}, own.bounces,
+      [](int n, PathOptions* options) { options->bounces = n; },
+      [&](int n) { return (1.0 + n) / (1.0 + own.bounces); }));
+  return knobs;
+}
+
+std::vector<EffectSwitch> SwitchesOf(const Scene& scene) {
+  const std::vector<EffectSwitch> all = {
+      {"interreflection", [](Scene* s) { s->path.bounces = 0; }},
+      {"mottling", [](Scene* s) { s->surface.mottling.reset(); }},
+      {"vessels", [](Scene* s) { s->surface.vessels.reset(); }},
+      {"coat",
+       [](Scene* s) {
+         s->surface.coat.reset();
+         s->surface.bounced_coat.reset();
+       }},
+      // One source at the camera that is as strong as all.
+      {"offset_guides",
+       [](Scene* s) {
+         std::vector<LightSource>& sources = s->calibration.light.sources;
+         for (size_t i = 1; i < sources.size(); ++i) sources[0].intensity += sources[i].intensity;
+         sources.resize(1);
+         sources[0].position.setZero();
+       }},
+      {"vignetting", [](Scene* s) { s->calibration.response.vignetting = 0; }},
+      {"chromatic_aberration", [](Scene* s) { s->chromatic_aberration.reset(); }},
+      {"shutter", [](Scene* s) { s->sensor.shutter.reset(); }},
+      {"sensor_noise", [](Scene* s) { s->sensor.noise.reset(); }},
+      {"jpeg", [](Scene* s) { s->sensor.jpeg.reset(); }},
+  };
+  std::vector<EffectSwitch> present;
+  for (const EffectSwitch& effect : all) {
+    if (std::ranges::find(scene.effects, effect.name) != scene.effects.end()) present.push_back(effect);
+  }
+  return present;
+}
+
+}  // namespace lumen
