@@ -167,6 +167,19 @@ std::string FontFile() {
   return "";
 }
 
+// OpenImageIO 2.4 draws a box for what isn't ASCII.
+std::string InAscii(const std::string& text) {
+  constexpr std::pair<std::string_view, std::string_view> kReplacements[] = {
+      {"×", "x"}, {"±", "+-"}, {"–", "-"}, {"°", " deg"}, {"…", "..."}};
+  std::string ascii = text;
+  for (const auto& [from, to] : kReplacements) {
+    for (size_t at = ascii.find(from); at != std::string::npos; at = ascii.find(from, at + to.size())) {
+      ascii.replace(at, from.size(), to);
+    }
+  }
+  return ascii;
+}
+
 }  // namespace
 
 Image8 ReadImage8(const fs::path& file, int channels) { return Read<uint8_t>(file, channels); }
@@ -211,7 +224,7 @@ void DrawText(Image8* image, int x, int y, int size_px, const std::string& text,
   const AlignX align_x = align == TextAlign::kLeft     ? AlignX::Left
                          : align == TextAlign::kCentre ? AlignX::Center
                                                        : AlignX::Right;
-  OIIO::ImageBufAlgo::render_text(buffer, x, y, text, size_px, font, ink, align_x);
+  OIIO::ImageBufAlgo::render_text(buffer, x, y, InAscii(text), size_px, font, ink, align_x);
 }
 
 }  // namespace lumen

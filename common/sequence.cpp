@@ -180,9 +180,23 @@ std::vector<double> KnownGains(const std::vector<SequenceFrame>& frames) {
 
 }  // namespace
 
+Image8 C3vdOctagon(int width, int height) {
+  constexpr double kCutX = 203.0 / 1350, kCutY = 251.5 / 1080;
+  Image8 mask(width, height, 1);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < width; ++x) {
+      const double left = (x + 0.5) / width, top = (y + 0.5) / height;
+      const double dx = std::min(left, 1 - left) / kCutX, dy = std::min(top, 1 - top) / kCutY;
+      *mask.Pixel(x, y) = dx + dy >= 1 ? 255 : 0;
+    }
+  }
+  return mask;
+}
+
 Calibration C3vdCalibration() {
   Calibration calibration;
   calibration.camera = C3vdIntrinsics();
+  calibration.mask = C3vdOctagon(calibration.camera.width, calibration.camera.height);
   calibration.light = EndomapperLight();
   calibration.light.calibrated = false;
   return calibration;

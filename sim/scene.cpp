@@ -33,25 +33,9 @@ CameraIntrinsics ReadSceneCamera(const ConfigTable& table) {
   }
 }
 
-// The octagon that C3VD's scope shows, in parts of the image: its corners are cut off along the lines
-// from 15.04% of the width to 23.29% of the height (measured on the data set's official mask, 1350×1080, to
-// half a pixel).
-Image8 OctagonMask(int width, int height) {
-  constexpr double kCutX = 203.0 / 1350, kCutY = 251.5 / 1080;
-  Image8 mask(width, height, 1);
-  for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const double left = (x + 0.5) / width, top = (y + 0.5) / height;
-      const double dx = std::min(left, 1 - left) / kCutX, dy = std::min(top, 1 - top) / kCutY;
-      *mask.Pixel(x, y) = dx + dy >= 1 ? 255 : 0;
-    }
-  }
-  return mask;
-}
-
 Image8 ReadMask(const ConfigTable& table, const CameraIntrinsics& camera) {
   if (!table.Has("mask")) return {};
-  if (table.String("mask") == "octagon") return OctagonMask(camera.width, camera.height);
+  if (table.String("mask") == "octagon") return C3vdOctagon(camera.width, camera.height);
   const Image8 mask = ReadImage8(table.Path("mask"), 1);
   if (mask.width == camera.width && mask.height == camera.height) return mask;
   // The nearest pixel of a mask of another size: it is drawn for the camera at its full one.

@@ -71,13 +71,13 @@ nlohmann::json Run(const Arguments& arguments, const CommonOptions& common) {
   const Photometry photometry = FitPhotometry(observations, arguments.options);
   nlohmann::json result = ToJson(photometry, observations);
   std::cout << ToTable(photometry, observations);
+  if (!arguments.folder.empty()) CreateFolder(arguments.folder);
+  if (!arguments.like.empty()) result["like"] = CompareWithOther(sequence, photometry, arguments);
   if (!arguments.folder.empty()) {
-    CreateFolder(arguments.folder);
     WriteImage(arguments.folder / "photometry.png", PlotPhotometry(photometry));
     WriteFile(arguments.folder / "photometry.json", result.dump(2) + "\n");
-    Say("picture in " + arguments.folder.string());
+    Say("pictures in " + arguments.folder.string());
   }
-  if (!arguments.like.empty()) result["like"] = CompareWithOther(sequence, photometry, arguments);
   if (!arguments.new_baseline.empty()) WriteBaseline(arguments.new_baseline, photometry, arguments.errors);
   if (arguments.baseline.empty()) return result;
   result["baseline"] = Compare(photometry, arguments);

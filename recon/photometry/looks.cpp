@@ -12,18 +12,19 @@ namespace lumen {
 namespace {
 
 constexpr std::array kPercentiles = {1, 5, 25, 50, 75, 95, 99};
-constexpr std::array kDepthPercentiles = {1, 25, 50, 75, 99};
+constexpr std::array kDistancePercentiles = {1, 25, 50, 75, 99};
 constexpr int kPictureHeight = 480;
 
 // What there is to count in a sequence's valid pixels.
 struct Census {
   std::array<std::array<int64_t, 256>, 3> codes{};
   int64_t white = 0, pixels = 0;
-  std::vector<float> z_mm;
+  std::vector<float> distance_mm;  // along the ray
 };
 
 Census Count(const Sequence& sequence) {
   const Image8 valid = ValidPixels(sequence.calibration);
+  const Camera<double> camera(sequence.calibration.camera);
   Census census;
   for (const SequenceFrame& frame : sequence.frames) {
     const Image8 color = ReadColor(sequence, frame);
@@ -35,7 +36,8 @@ Census Count(const Sequence& sequence) {
         for (int c = 0; c < 3; ++c) ++census.codes[c][rgb[c]];
         census.white += std::min({rgb[0], rgb[1], rgb[2]}) == 255;
         ++census.pixels;
-        if (!z.empty() && std::isfinite(*z.Pixel(x, y))) census.z_mm.push_back(*z.Pixel(x, y));
+        if (z.empty() || !std::isfinite(*z.Pixel(x, y))) continue;
+        census.distance_mm.push_back(static_cast<float>(*z.Pixel(x, y) / camera.Unproject(Vec2d(x, y))->z()));
       }
     }
   }
@@ -95,8 +97,9 @@ Looks LooksOf(const Sequence& sequence, const Photometry& photometry) {
     add(fmt::format("{} saturated %", ChannelName(c)), 100 * double(census.codes[c][255]) / pixels);
   }
   add("white %", 100 * double(census.white) / pixels);
-  for (int percent : kDepthPercentiles) {
-    if (!census.z_mm.empty()) add(fmt::format("z p{}, mm", percent), Percentile(&census.z_mm, percent));
+  for (int percent : kDistancePercentiles) {
+    if (census.distance_mm.empty()) break;
+    add(fmt::format("distance p{}, mm", percent), Percentile(&census.distance_mm, percent));
   }
   for (const char* figure : {"t_exponent", "cos_exponent", "spread", "r_squared", "residual"}) {
     for (int c = 0; c < 3; ++c) {

@@ -24,8 +24,8 @@ struct Looks {
 };
 
 // Percentiles of the valid pixels' codes by channel, parts that are saturated (in a channel; in all: white),
-// percentiles of z, and the fit's figures by channel. The photometry is that of the sequence. Throws
-// InputError.
+// percentiles of the distance along the ray, and the fit's figures by channel. The photometry is that of the
+// sequence. Throws InputError.
 Looks LooksOf(const Sequence& sequence, const Photometry& photometry);
 
 // Figures that both have, side by side; a mark where the first is further from the second than `tolerance`,

@@ -145,7 +145,7 @@ class CostMeasurement {
       const double limit = kCurvesShare * options_.seconds;
       double longest = 0;  // seconds a unit of work that settings of this knob took
       for (const KnobSetting& setting : knob.settings) {
-        if (setting.options.samples * kReferenceAhead > about->samples) break;
+        if (!knob.biased && setting.options.samples * kReferenceAhead > about->samples) break;
         const double expected = longest * setting.work * options_.runs;
         if (SecondsSince(start) + expected > limit) break;
         const auto setting_start = Clock::now();
