@@ -1,93 +1,24 @@
 #include "sim/cost/render_cost.h"
 
-#include <time.h>
-
 #include <algorithm>
-#include <chrono>
 #include <cmath>
-#include <optional>
 
 #include "common/error.h"
 #include "common/progress.h"
 #include "common/random.h"
+#include "sim/cost/frame_setup.h"
 #include "sim/cost/knobs.h"
 #include "sim/cost/reference.h"
-#include "sim/photographer.h"
-#include "sim/render.h"
+#include "sim/cost/timing.h"
 
 namespace lumen {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 // Parts of the time that is given, and how many times a curve's samples a reference has at least.
 constexpr double kReferenceShare = 0.22, kCurvesShare = 0.1, kEffectsShare = 0.1;
 constexpr int kReferenceAhead = 8;
 constexpr int kLongestReference = 1 << 16;  // samples
 constexpr int kAllBounces = 64;  // stands for all: what is left of light behind them, 0.8^64, is 1e-6
-
-double CpuSeconds() {
-  timespec time;
-  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &time);
-  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
-}
-
-double SecondsSince(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
-
-double Median(std::vector<double> values) {
-  std::ranges::sort(values);
-  const size_t n = values.size();
-  return n % 2 ? values[n / 2] : (values[n / 2 - 1] + values[n / 2]) / 2;
-}
-
-double HalfRange(const std::vector<double>& values) {
-  if (std::ranges::any_of(values, [](double v) { return std::isnan(v); })) return std::nan("");
-  const auto [low, high] = std::ranges::minmax(values);
-  return (high - low) / 2;
-}
-
-// All that one frame of a scene takes. The scene and the wall are referred to.
-class FrameSetup {
- public:
-  FrameSetup(const Scene& scene, const RayScene& wall, const std::vector<Vec3d>& normals, int frame,
-             uint64_t seed)
-      : scene_(scene),
-        frame_(frame),
-        path_scene_{&wall, &scene.surface, SurfaceSeed(seed), &normals},
-        camera_(scene.calibration.camera),
-        valid_(ValidPixels(scene.calibration)),
-        photographer_(scene, valid_, seed) {
-    if (scene.sensor.shutter) motion_.emplace(*scene.sensor.shutter, scene.world_from_camera, frame);
-  }
-
-  const Image8& valid() const { return valid_; }
-
-  ImageF Trace(const PathOptions& options, uint64_t seed) const {
-    const View view{&camera_, &valid_, scene_.world_from_camera[frame_], &scene_.calibration.light,
-                    motion_ ? &*motion_ : nullptr};
-    Film film;
-    RenderFrame(path_scene_, view, options, seed, frame_, false, &film);
-    return std::move(film.radiance);
-  }
-
-  // CPU seconds of the frame, sensor included.
-  double Take(uint64_t seed) const {
-    const double start = CpuSeconds();
-    photographer_.Photograph(frame_, scene_.sensor.gain, Trace(scene_.path, seed));
-    return CpuSeconds() - start;
-  }
-
- private:
-  const Scene& scene_;
-  int frame_;
-  PathScene path_scene_;
-  Camera<float> camera_;
-  Image8 valid_;
-  Photographer photographer_;
-  std::optional<CameraMotion> motion_;
-};
 
 class CostMeasurement {
  public:
@@ -98,7 +29,7 @@ class CostMeasurement {
         normals_(scene.surface.coat ? VertexNormals(scene.geometry.mesh) : std::vector<Vec3d>()),
         setup_(scene, wall_, normals_, options.frame, options.seed),
         progress_("cost"),
-        start_(Clock::now()) {}
+        start_(WallSeconds()) {}
 
   RenderCost Run() {
     result_.width = scene_.calibration.camera.width;
@@ -119,9 +50,9 @@ class CostMeasurement {
   // Both halves together last about `share` of the time.
   Reference Converge(PathOptions options, double share, CostReference* about) {
     options.samples = scene_.path.samples;
-    const auto start = Clock::now();
+    const auto start = WallSeconds();
     setup_.Trace(options, Seed(1000));
-    const double a_sample = SecondsSince(start) / options.samples;
+    const double a_sample = (WallSeconds() - start) / options.samples;
     const double half = share * options_.seconds / 2 / a_sample;
     options.samples = static_cast<int>(std::clamp(half, 8.0, double(kLongestReference) / 2));
     about->samples = 2 * options.samples;
@@ -141,16 +72,16 @@ class CostMeasurement {
     const Reference reference = Converge(converged, share, about);
     for (const Knob& knob : knobs) {
       CostCurve curve{knob.name, {}};
-      const auto start = Clock::now();
+      const auto start = WallSeconds();
       const double limit = kCurvesShare * options_.seconds;
       double longest = 0;  // seconds a unit of work that settings of this knob took
       for (const KnobSetting& setting : knob.settings) {
         if (!knob.biased && setting.options.samples * kReferenceAhead > about->samples) break;
         const double expected = longest * setting.work * options_.runs;
-        if (SecondsSince(start) + expected > limit) break;
-        const auto setting_start = Clock::now();
+        if (WallSeconds() - start + expected > limit) break;
+        const auto setting_start = WallSeconds();
         curve.points.push_back(MeasureSetting(knob.name, setting, reference));
-        longest = SecondsSince(setting_start) / options_.runs / setting.work;
+        longest = (WallSeconds() - setting_start) / options_.runs / setting.work;
         Update();
       }
       curves->curves.push_back(std::move(curve));
@@ -161,9 +92,8 @@ class CostMeasurement {
     std::vector<double> seconds;
     std::vector<Luminance> runs;
     for (int run = 0; run < options_.runs; ++run) {
-      const double start = CpuSeconds();
-      const ImageF radiance = setup_.Trace(setting.options, Seed(run));
-      seconds.push_back(CpuSeconds() - start);
+      ImageF radiance;
+      seconds.push_back(CpuSecondsOf([&] { radiance = setup_.Trace(setting.options, Seed(run)); }));
       runs.push_back(LuminanceOf(radiance, setup_.valid()));
     }
     CostPoint point;
@@ -192,34 +122,25 @@ class CostMeasurement {
       Scene without = scene_;
       effect.switch_off(&without);
       const FrameSetup setup(without, wall_, normals_, options_.frame, options_.seed);
-      const auto start = Clock::now();
+      const auto start = WallSeconds();
       std::vector<double> on, off;
       // Short frames are taken oftener: their clock is coarser.
       const double limit = kEffectsShare * options_.seconds / static_cast<double>(scene_.effects.size());
-      for (int run = 0; run < options_.runs || (run < 5 * options_.runs && SecondsSince(start) < limit);
+      for (int run = 0; run < options_.runs || (run < 5 * options_.runs && WallSeconds() - start < limit);
            ++run) {
-        on.push_back(setup_.Take(Seed(run)));
-        off.push_back(setup.Take(Seed(run)));
+        on.push_back(CpuSecondsOf([&] { setup_.Take(Seed(run)); }));
+        off.push_back(CpuSecondsOf([&] { setup.Take(Seed(run)); }));
       }
-      result_.effects.push_back({effect.name, Median(on) - Median(off), 0});
-      result_.effects.back().seconds_error = ErrorOfDifference(on, off);
+      result_.effects.push_back(
+          {effect.name, Median(on) - Median(off), std::hypot(MedianError(on), MedianError(off))});
       whole.insert(whole.end(), on.begin(), on.end());
       Update();
     }
-    for (int run = 0; whole.size() < size_t(options_.runs); ++run) whole.push_back(setup_.Take(Seed(run)));
+    for (int run = 0; whole.size() < size_t(options_.runs); ++run) {
+      whole.push_back(CpuSecondsOf([&] { setup_.Take(Seed(run)); }));
+    }
     result_.frame_seconds = Median(whole);
-    result_.frame_seconds_error = StandardErrorOfMedian(whole);
-  }
-
-  // From the interquartile range, as interruptions make the tails long: a median's standard error is
-  // 1.253 σ/√n, and σ is 0.741 of that range for a normal distribution.
-  static double StandardErrorOfMedian(std::vector<double> values) {
-    std::ranges::sort(values);
-    const size_t n = values.size();
-    return 1.253 * 0.741 * (values[n - 1 - n / 4] - values[n / 4]) / std::sqrt(double(n));
-  }
-  static double ErrorOfDifference(const std::vector<double>& a, const std::vector<double>& b) {
-    return std::hypot(StandardErrorOfMedian(a), StandardErrorOfMedian(b));
+    result_.frame_seconds_error = MedianError(whole);
   }
 
   Luminance Measure(const PathOptions& options, uint64_t seed) const {
@@ -228,7 +149,7 @@ class CostMeasurement {
 
   uint64_t Seed(uint64_t run) const { return RandomBits(options_.seed, 0x636f7374ull, run); }
 
-  void Update() { progress_.Update(std::min(0.99, SecondsSince(start_) / options_.seconds)); }
+  void Update() { progress_.Update(std::min(0.99, (WallSeconds() - start_) / options_.seconds)); }
 
   const Scene& scene_;
   const RenderCostOptions& options_;
@@ -236,7 +157,7 @@ class CostMeasurement {
   std::vector<Vec3d> normals_;
   FrameSetup setup_;
   Progress progress_;
-  Clock::time_point start_;
+  double start_;
   RenderCost result_;
 };
 

@@ -35,7 +35,7 @@ struct SettingBias {
 struct EffectCost {
   std::string name;          // as in Scene::effects
   double seconds = 0;        // CPU seconds that a frame takes less without it
-  double seconds_error = 0;  // half the range over runs of both
+  double seconds_error = 0;  // its standard error
 };
 
 // Measures, in this order: relative error of a pixel's luminance (root mean square over valid pixels, in

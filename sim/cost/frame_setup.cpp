@@ -1,0 +1,31 @@
+#include "sim/cost/frame_setup.h"
+
+#include "sim/render.h"
+
+namespace lumen {
+
+FrameSetup::FrameSetup(const Scene& scene, const RayScene& wall, const std::vector<Vec3d>& normals, int frame,
+                       uint64_t seed)
+    : scene_(scene),
+      frame_(frame),
+      path_scene_{&wall, &scene.surface, SurfaceSeed(seed), &normals},
+      camera_(scene.calibration.camera),
+      valid_(ValidPixels(scene.calibration)),
+      photographer_(scene, valid_, seed) {
+  if (scene.sensor.shutter) motion_.emplace(*scene.sensor.shutter, scene.world_from_camera, frame);
+}
+
+ImageF FrameSetup::Trace(const PathOptions& options, uint64_t seed, PathCount* count) const {
+  const View view{&camera_, &valid_, scene_.world_from_camera[frame_], &scene_.calibration.light,
+                  motion_ ? &*motion_ : nullptr};
+  Film film;
+  const PathCount counted = RenderFrame(path_scene_, view, options, seed, frame_, false, &film);
+  if (count != nullptr) *count = counted;
+  return std::move(film.radiance);
+}
+
+Image8 FrameSetup::Take(uint64_t seed) const {
+  return photographer_.Photograph(frame_, scene_.sensor.gain, Trace(scene_.path, seed));
+}
+
+}  // namespace lumen

@@ -1,0 +1,28 @@
+// Times, and what repeated ones say.
+#pragma once
+
+#include <vector>
+
+namespace lumen {
+
+// That the process has spent on all its threads.
+double CpuSeconds();
+// Since some moment.
+double WallSeconds();
+
+// Runs body and answers the CPU seconds that it took.
+template <class Body>
+double CpuSecondsOf(const Body& body) {
+  const double start = CpuSeconds();
+  body();
+  return CpuSeconds() - start;
+}
+
+double Median(std::vector<double> values);
+// NaN where one of them is.
+double HalfRange(const std::vector<double>& values);
+// Of their median, from the interquartile range, as interruptions make the tails long: 1.253 σ/√n (for a
+// normal distribution, as the next), σ being 0.741 of that range.
+double MedianError(std::vector<double> values);
+
+}  // namespace lumen

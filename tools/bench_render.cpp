@@ -1,0 +1,310 @@
+// How fast the path tracer is: samples a CPU second, CPU seconds to a given noise, memory, threads, and how
+// time grows with pixels, samples and triangles. Prints one table. CPU seconds are the process's, medians of
+// runs.
+#include <fmt/core.h>
+#include <sys/resource.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cmath>
+#include <fstream>
+
+#include "common/parallel.h"
+#include "common/progress.h"
+#include "common/random.h"
+#include "sim/cost/frame_setup.h"
+#include "sim/cost/reference.h"
+#include "sim/cost/timing.h"
+
+namespace lumen {
+namespace {
+
+using Settings = std::vector<std::string>;
+
+const Settings kTexture = {"surface.mottling.contrast=0.2", "surface.mottling.scale_mm=7",
+                           "surface.vessels.spacing_mm=7", "surface.vessels.width_mm=0.35"};
+const Settings kCoat = {"surface.coat.ior=1.37", "surface.coat.roughness=0.2"};
+const Settings kEightVertices = {"path.bounces=7"};
+
+// Guides of one CF-H190L, mm.
+constexpr double kGuides[3][2] = {{3.24, 0.55}, {-2.77, 2.66}, {-1.27, -3.14}};
+
+struct Arguments {
+  std::filesystem::path scene = LUMEN_SOURCE_FOLDER "/scenes/bench/colon.toml";
+  double seconds = 60;  // CPU seconds that one render may take
+  int runs = 3;
+  bool large = false;
+};
+
+Settings operator+(Settings a, const Settings& b) {
+  a.insert(a.end(), b.begin(), b.end());
+  return a;
+}
+
+// A scene with what it takes to trace its first frame.
+struct Subject {
+  Scene scene;
+  RayScene wall;
+  std::vector<Vec3d> normals;
+  FrameSetup setup;
+
+  explicit Subject(Scene from)
+      : scene(std::move(from)),
+        wall(scene.geometry.mesh),
+        normals(scene.surface.coat ? VertexNormals(scene.geometry.mesh) : std::vector<Vec3d>()),
+        setup(scene, wall, normals, 0, 0) {}
+};
+
+// guides: how many off the axis; 0 = one source at the camera.
+Scene SceneWith(const Arguments& arguments, const Settings& settings, int guides) {
+  Scene scene = ReadScene(arguments.scene, settings, 0);
+  std::vector<LightSource>& sources = scene.calibration.light.sources;
+  const LightSource one = sources[0];
+  for (int i = 0; i < guides; ++i) {
+    sources.resize(static_cast<size_t>(i) + 1, one);
+    sources[i].position = Vec3d(kGuides[i][0], kGuides[i][1], 0);
+    sources[i].intensity = one.intensity / guides;
+  }
+  return scene;
+}
+
+double CpuSecondsOfFrame(const Subject& subject, const PathOptions& options, int runs, PathCount* count) {
+  std::vector<double> seconds;
+  for (int run = 0; run < runs; ++run) {
+    seconds.push_back(CpuSecondsOf([&] { subject.setup.Trace(options, RandomBits(1, run), count); }));
+  }
+  return Median(seconds);
+}
+
+void DirectLight(const Arguments& arguments) {
+  fmt::print("\ndirect light, a textured wall of {} triangles\n",
+             SceneWith(arguments, {}, 0).geometry.mesh.faces.size());
+  const std::pair<int, const char*> kCases[] = {
+      {0, "light at the camera"}, {1, "one guide off the axis"}, {3, "three guides"}};
+  for (const auto& [guides, name] : kCases) {
+    const Subject subject(SceneWith(arguments, kTexture, guides));
+    PathOptions options = subject.scene.path;
+    options.samples = 16;
+    PathCount count;
+    const double seconds = CpuSecondsOfFrame(subject, options, arguments.runs, &count);
+    fmt::print("  {:<40}{:>8.2f} Msamples/CPU-s{:>8.2f} Mrays/CPU-s\n", name,
+               1e-6 * static_cast<double>(count.samples) / seconds,
+               1e-6 * static_cast<double>(count.rays) / seconds);
+  }
+}
+
+// CPU seconds and noise of a render with so many samples; the noise from two with different random numbers.
+struct Trial {
+  int samples;
+  double seconds, noise;
+};
+
+Trial TrialOf(const Subject& subject, PathOptions options, int samples, ErrorMeasure measure) {
+  options.samples = samples;
+  Trial trial{samples, 0, 0};
+  Luminance pictures[2];
+  std::vector<double> seconds;
+  for (int k = 0; k < 2; ++k) {
+    ImageF radiance;
+    seconds.push_back(
+        CpuSecondsOf([&] { radiance = subject.setup.Trace(options, RandomBits(2, samples, k)); }));
+    pictures[k] = LuminanceOf(radiance, subject.setup.valid());
+  }
+  trial.seconds = (seconds[0] + seconds[1]) / 2;
+  // The reference's noise is that of the mean of both: less than one's by √2.
+  trial.noise = std::sqrt(2.0) * Reference(pictures[0], pictures[1]).Noise(measure);
+  return trial;
+}
+
+// CPU seconds to a noise: the number of samples is doubled until it is reached, and the last two are
+// interpolated (logarithms). Where that would take too long, extrapolated by 1/√samples, and said so.
+std::string TimeToNoise(const Subject& subject, double noise, ErrorMeasure measure, double limit_seconds) {
+  Trial before = TrialOf(subject, subject.scene.path, 2, measure);
+  if (before.noise <= noise)
+    return fmt::format("{:>8.3f} CPU-s (2 samples have {:.2f}%)", before.seconds, 100 * before.noise);
+  for (;;) {
+    if (2 * before.seconds > limit_seconds) {
+      const double factor = std::pow(before.noise / noise, 2);
+      return fmt::format("{:>8.2f} CPU-s (extrapolated {:.1f} times from {} samples, {:.2f}%)",
+                         before.seconds * factor, factor, before.samples, 100 * before.noise);
+    }
+    const Trial next = TrialOf(subject, subject.scene.path, 2 * before.samples, measure);
+    if (next.noise <= noise) {
+      const double t = std::log(before.noise / noise) / std::log(before.noise / next.noise);
+      return fmt::format("{:>8.3f} CPU-s ({:.1f} samples)",
+                         before.seconds * std::pow(next.seconds / before.seconds, t),
+                         before.samples * std::pow(2, t));
+    }
+    before = next;
+  }
+}
+
+void Noise(const Arguments& arguments) {
+  fmt::print("\nCPU seconds to a noise, 8 vertices\n");
+  const Subject diffuse(SceneWith(arguments, kEightVertices, 0));
+  const auto line = [&](const char* name, const Subject& subject, double noise, ErrorMeasure measure) {
+    fmt::print("  {:<40}{}\n", name, TimeToNoise(subject, noise, measure, arguments.seconds));
+  };
+  line("diffuse, pixels to 5.5%", diffuse, 0.055, ErrorMeasure::kPixels);
+  line("diffuse, pixels to 1%", diffuse, 0.01, ErrorMeasure::kPixels);
+  line("diffuse, 8x8 blocks to 0.5%", diffuse, 0.005, ErrorMeasure::kBlocks);
+  const Subject whole(SceneWith(arguments, kEightVertices + kTexture + kCoat, 3));
+  line("texture, coat, 3 guides, to 5.5%", whole, 0.055, ErrorMeasure::kPixels);
+}
+
+// The sensor's noise at gain 1, root mean square over valid pixels and channels, from its definition
+// (noise.h).
+double SensorNoiseOf(const SensorNoise& noise, const ImageF& radiance, const Image8& valid) {
+  double sum = 0;
+  int64_t count = 0;
+  for (int i = 0; i < valid.width * valid.height; ++i) {
+    if (!valid.data[i]) continue;
+    for (int c = 0; c < 3; ++c) sum += radiance.data[3 * i + c] / noise.full_scale_e;
+    ++count;
+  }
+  return std::sqrt(sum / (3 * double(count)) + std::pow(noise.read_e / noise.full_scale_e, 2));
+}
+
+double NoiseOfChannels(const ImageF& a, const ImageF& b, const Image8& valid) {
+  double sum = 0;
+  int64_t count = 0;
+  for (int i = 0; i < valid.width * valid.height; ++i) {
+    if (!valid.data[i]) continue;
+    for (int c = 0; c < 3; ++c) sum += std::pow(double(a.data[3 * i + c]) - b.data[3 * i + c], 2) / 2;
+    ++count;
+  }
+  return std::sqrt(sum / (3 * double(count)));
+}
+
+void WholeFrame(const Arguments& arguments) {
+  const Subject subject(SceneWith(
+      arguments, kTexture + Settings{"camera.width=1350", "camera.height=1080", "path.bounces=3"}, 0));
+  const SensorNoise sensor;
+  PathOptions options = subject.scene.path;
+  fmt::print("\n1350x1080, 3 bounces, textured, at the noise of the sensor (10000 e, read 5 e, gain 1)\n");
+  for (options.samples = 1;; options.samples *= 2) {
+    ImageF pictures[2];
+    double seconds = 0;
+    for (int k = 0; k < 2; ++k) {
+      seconds += CpuSecondsOf([&] { pictures[k] = subject.setup.Trace(options, RandomBits(3, k)); }) / 2;
+    }
+    const double noise = NoiseOfChannels(pictures[0], pictures[1], subject.setup.valid());
+    const double limit = SensorNoiseOf(sensor, pictures[0], subject.setup.valid());
+    fmt::print("  {:>4} samples: noise {:.5f}, sensor's {:.5f} {:>20.2f} CPU-s\n", options.samples, noise,
+               limit, seconds);
+    if (noise <= limit || 2 * seconds > arguments.seconds) break;
+  }
+}
+
+// Most memory that the process has held since ResetPeak, MB.
+double PeakMegabytes() {
+  std::ifstream status("/proc/self/status");
+  for (std::string line; std::getline(status, line);) {
+    if (line.starts_with("VmHWM:")) return std::stod(line.substr(6)) / 1024;
+  }
+  return 0;
+}
+void ResetPeak() { std::ofstream("/proc/self/clear_refs") << "5"; }
+
+void Memory(const Arguments& arguments) {
+  fmt::print("\nmemory beyond scene, its tree of boxes and film, three guides, texture, coat, 8 vertices\n");
+  const Subject subject(SceneWith(arguments, kEightVertices + kTexture + kCoat, 3));
+  const double film = 3 * 4.0 * subject.setup.valid().width * subject.setup.valid().height / 1048576;
+  for (int samples : {1, 4, 16}) {
+    PathOptions options = subject.scene.path;
+    options.samples = samples;
+    ResetPeak();
+    const double before = PeakMegabytes();
+    subject.setup.Trace(options, 1);
+    fmt::print("  {:>4} samples {:>34.1f} MB\n", samples, PeakMegabytes() - before - film);
+  }
+}
+
+void Threads(const Arguments& arguments) {
+  fmt::print("\ntwo threads against one (wall time, best of {} runs)\n", 2 * arguments.runs);
+  const std::pair<const char*, Settings> kCases[] = {{"direct light", kTexture},
+                                                     {"8 vertices", kTexture + kEightVertices}};
+  for (const auto& [name, settings] : kCases) {
+    const Subject subject(SceneWith(arguments, settings, 0));
+    PathOptions options = subject.scene.path;
+    options.samples = options.bounces > 0 ? 4 : 64;
+    double best[2] = {1e30, 1e30};
+    for (int run = 0; run < 2 * arguments.runs; ++run) {
+      for (int threads : {1, 2}) {
+        SetThreadCount(threads);
+        const double start = WallSeconds();
+        subject.setup.Trace(options, 1);
+        best[threads - 1] = std::min(best[threads - 1], WallSeconds() - start);
+      }
+    }
+    SetThreadCount(0);
+    fmt::print("  {:<40}{:>8.2f} times\n", name, best[0] / best[1]);
+  }
+}
+
+void Growth(const Arguments& arguments) {
+  fmt::print("\nhow time grows, direct light and 3 bounces\n");
+  const auto line = [&](const std::string& name, const Settings& settings, int samples, double& last) {
+    const Subject subject(SceneWith(arguments, settings + kTexture, 0));
+    PathOptions direct = subject.scene.path;
+    direct.samples = samples;
+    PathOptions bounced = direct;
+    bounced.bounces = 3;
+    PathCount count;
+    const double seconds = CpuSecondsOfFrame(subject, direct, arguments.runs, &count);
+    const double bounced_seconds = CpuSecondsOfFrame(subject, bounced, 1, nullptr);
+    const double each = static_cast<double>(count.samples);
+    fmt::print("  {:<40}{:>8.3f} CPU-s {:>7.1f} ns a sample{:>9.3f} CPU-s {:>7.1f} ns\n", name, seconds,
+               1e9 * seconds / each, bounced_seconds, 1e9 * bounced_seconds / each);
+    last = bounced_seconds;
+  };
+  double last = 0;
+  for (const auto& [width, height] :
+       {std::pair(169, 135), {338, 270}, {675, 540}, {1350, 1080}, {2700, 2160}}) {
+    line(fmt::format("{}x{} pixels", width, height),
+         {fmt::format("camera.width={}", width), fmt::format("camera.height={}", height)}, 2, last);
+  }
+  for (int samples : {1, 4, 16, 64}) {
+    line(fmt::format("{} samples", samples), {}, samples, last);
+    if (4 * last > arguments.seconds) break;
+  }
+  // The wall's tolerance and its number of triangles are inverse to each other.
+  const double finest = arguments.large ? 0.0006 : 0.0035;
+  for (double tolerance_mm : {0.3, 0.06, 0.015, 0.0035, 0.0006}) {
+    if (tolerance_mm < finest) break;
+    const Settings fine = {fmt::format("geometry.tolerance_mm={}", tolerance_mm)};
+    line(fmt::format("{} triangles", SceneWith(arguments, fine, 0).geometry.mesh.faces.size()), fine, 4,
+         last);
+  }
+}
+
+void Run(const Arguments& arguments) {
+  SetQuiet(true);
+  fmt::print("{} threads\n", ThreadCount());
+  DirectLight(arguments);
+  Noise(arguments);
+  WholeFrame(arguments);
+  Memory(arguments);
+  Threads(arguments);
+  Growth(arguments);
+}
+
+}  // namespace
+}  // namespace lumen
+
+int main(int argc, char** argv) {
+  CLI::App app{"Measures the path tracer's speed.", "lumen_bench_render"};
+  lumen::Arguments arguments;
+  app.add_option("scene", arguments.scene, "the scene to vary (default: scenes/bench/colon.toml)");
+  app.add_option("--seconds", arguments.seconds, "CPU seconds that one render may take (default: 60)");
+  app.add_option("--runs", arguments.runs, "of which the median counts (default: 3)");
+  app.add_flag("--large", arguments.large, "up to five million triangles");
+  CLI11_PARSE(app, argc, argv);
+  try {
+    lumen::Run(arguments);
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "lumen_bench_render: {}\n", error.what());
+    return 1;
+  }
+  return 0;
+}
