@@ -92,14 +92,22 @@ void PaintSegment(const Vec2d& a, const Vec2d& b, double width, const Rgb8& colo
 }
 
 void Rasterize(const DrawnLine& line, double scale, Image8* image) {
+  double phase = 0;  // how far into a dash and its gap the line is
   for (size_t i = 0; i + 1 < line.points.size(); ++i) {
     const Vec2d a = line.points[i], b = line.points[i + 1];
+    if (!line.dashed) {
+      PaintSegment(scale * a, scale * b, scale * line.width, line.color, image);
+      continue;
+    }
     const double length = (b - a).norm();
-    const double dash = line.dashed ? kDash : length, step = line.dashed ? kDash + kGapInDash : length + 1;
-    for (double from = 0; from < length; from += step) {
-      const Vec2d along = (b - a) / length;
-      PaintSegment(scale * (a + from * along), scale * (a + std::min(length, from + dash) * along),
-                   scale * line.width, line.color, image);
+    for (double from = 0; from < length;) {
+      const bool on = phase < kDash;
+      const double to = std::min(length, from + (on ? kDash : kDash + kGapInDash) - phase);
+      const auto point = [&](double along) { return Vec2d(scale * (a + along / length * (b - a))); };
+      if (on) PaintSegment(point(from), point(to), scale * line.width, line.color, image);
+      phase = std::fmod(phase + to - from, kDash + kGapInDash);
+      if (to <= from) break;  // what rounding leaves of a step
+      from = to;
     }
   }
 }

@@ -50,7 +50,8 @@ class Scale {
                         : rough <= 5 * power ? 5 * power
                                              : 10 * power;
     std::vector<double> ticks;
-    for (double i = std::ceil(low_ / step); i * step <= high_; ++i) ticks.push_back(i * step);
+    // + 0: a tick at −0 is 0.
+    for (double i = std::ceil(low_ / step); i * step <= high_; ++i) ticks.push_back(i * step + 0.0);
     return ticks;
   }
 

@@ -117,8 +117,8 @@ TEST(CostReference, OnlyValidPixelsCount) {
 }
 
 TEST(CostTiming, MediansAndRanges) {
-  EXPECT_EQ(Median({3, 1, 2}), 2);
-  EXPECT_EQ(Median({4, 1, 2, 3}), 2.5);
+  EXPECT_EQ(MedianOf({3, 1, 2}), 2);
+  EXPECT_EQ(MedianOf({4, 1, 2, 3}), 2.5);
   EXPECT_EQ(HalfRange({3, 1, 2}), 1);
   EXPECT_TRUE(std::isnan(HalfRange({3, std::nan(""), 2})));
 }

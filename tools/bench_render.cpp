@@ -73,7 +73,7 @@ double CpuSecondsOfFrame(const Subject& subject, const PathOptions& options, int
   for (int run = 0; run < runs; ++run) {
     seconds.push_back(CpuSecondsOf([&] { subject.setup.Trace(options, RandomBits(1, run), count); }));
   }
-  return Median(seconds);
+  return MedianOf(seconds);
 }
 
 void DirectLight(const Arguments& arguments) {
@@ -280,6 +280,7 @@ void Growth(const Arguments& arguments) {
 
 void Run(const Arguments& arguments) {
   SetQuiet(true);
+  std::setvbuf(stdout, nullptr, _IOLBF, 0);
   fmt::print("{} threads\n", ThreadCount());
   DirectLight(arguments);
   Noise(arguments);

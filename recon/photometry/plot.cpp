@@ -57,7 +57,10 @@ PlotSeries ZeroLine(const PlotSeries& points) {
 }
 
 Panel Charted(const std::string& title, const std::string& x_label, std::vector<PlotSeries> series) {
-  return {title, ToImage(DrawPlot({"", {.label = x_label}, {}, std::move(series)}, kWidth, kHeight))};
+  Plot plot;
+  plot.x.label = x_label;
+  plot.series = std::move(series);
+  return {title, ToImage(DrawPlot(plot, kWidth, kHeight))};
 }
 
 Panel FactorPanel(const std::string& what, const std::string& x_label, const std::vector<Bin>& bins,

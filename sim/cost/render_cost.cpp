@@ -98,7 +98,7 @@ class CostMeasurement {
     }
     CostPoint point;
     point.setting = setting.label;
-    point.seconds = Median(seconds);
+    point.seconds = MedianOf(seconds);
     point.seconds_spread = HalfRange(seconds);
     point.is_default = setting.is_own;
     for (ErrorMeasure measure : kErrorMeasures) {
@@ -132,14 +132,14 @@ class CostMeasurement {
         off.push_back(CpuSecondsOf([&] { setup.Take(Seed(run)); }));
       }
       result_.effects.push_back(
-          {effect.name, Median(on) - Median(off), std::hypot(MedianError(on), MedianError(off))});
+          {effect.name, MedianOf(on) - MedianOf(off), std::hypot(MedianError(on), MedianError(off))});
       whole.insert(whole.end(), on.begin(), on.end());
       Update();
     }
     for (int run = 0; whole.size() < size_t(options_.runs); ++run) {
       whole.push_back(CpuSecondsOf([&] { setup_.Take(Seed(run)); }));
     }
-    result_.frame_seconds = Median(whole);
+    result_.frame_seconds = MedianOf(whole);
     result_.frame_seconds_error = MedianError(whole);
   }
 

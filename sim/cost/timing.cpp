@@ -21,7 +21,7 @@ double CpuSeconds() { return Seconds(CLOCK_PROCESS_CPUTIME_ID); }
 
 double WallSeconds() { return Seconds(CLOCK_MONOTONIC); }
 
-double Median(std::vector<double> values) {
+double MedianOf(std::vector<double> values) {
   std::ranges::sort(values);
   const size_t n = values.size();
   return n % 2 ? values[n / 2] : (values[n / 2 - 1] + values[n / 2]) / 2;

@@ -18,7 +18,7 @@ double CpuSecondsOf(const Body& body) {
   return CpuSeconds() - start;
 }
 
-double Median(std::vector<double> values);
+double MedianOf(std::vector<double> values);
 // NaN where one of them is.
 double HalfRange(const std::vector<double>& values);
 // Of their median, from the interquartile range, as interruptions make the tails long: 1.253 σ/√n (for a
