@@ -102,11 +102,12 @@ void Rasterize(const DrawnLine& line, double scale, Image8* image) {
     const double length = (b - a).norm();
     for (double from = 0; from < length;) {
       const bool on = phase < kDash;
-      const double to = std::min(length, from + (on ? kDash : kDash + kGapInDash) - phase);
+      // At least a little, so that what rounding leaves of a step ends.
+      const double left = std::max(1e-6, (on ? kDash : kDash + kGapInDash) - phase);
+      const double to = std::min(length, from + left);
       const auto point = [&](double along) { return Vec2d(scale * (a + along / length * (b - a))); };
       if (on) PaintSegment(point(from), point(to), scale * line.width, line.color, image);
       phase = std::fmod(phase + to - from, kDash + kGapInDash);
-      if (to <= from) break;  // what rounding leaves of a step
       from = to;
     }
   }

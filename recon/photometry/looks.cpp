@@ -14,6 +14,8 @@ namespace {
 constexpr std::array kPercentiles = {1, 5, 25, 50, 75, 95, 99};
 constexpr std::array kDistancePercentiles = {1, 25, 50, 75, 99};
 constexpr int kPictureHeight = 480;
+// Codes from here on count as saturated: what was 255 once, compression has moved by a few.
+constexpr int kSaturated = 250;
 
 // What there is to count in a sequence's valid pixels.
 struct Census {
@@ -34,7 +36,7 @@ Census Count(const Sequence& sequence) {
         if (!*valid.Pixel(x, y)) continue;
         const uint8_t* rgb = color.Pixel(x, y);
         for (int c = 0; c < 3; ++c) ++census.codes[c][rgb[c]];
-        census.white += std::min({rgb[0], rgb[1], rgb[2]}) == 255;
+        census.white += std::min({rgb[0], rgb[1], rgb[2]}) >= kSaturated;
         ++census.pixels;
         if (z.empty() || !std::isfinite(*z.Pixel(x, y))) continue;
         census.distance_mm.push_back(static_cast<float>(*z.Pixel(x, y) / camera.Unproject(Vec2d(x, y))->z()));
@@ -94,7 +96,7 @@ Looks LooksOf(const Sequence& sequence, const Photometry& photometry) {
     }
   }
   for (int c = 0; c < 3; ++c) {
-    add(fmt::format("{} saturated %", ChannelName(c)), 100 * double(census.codes[c][255]) / pixels);
+    add(fmt::format("{} saturated %", ChannelName(c)), 100 * (1 - looks.distribution[c][kSaturated - 1]));
   }
   add("white %", 100 * double(census.white) / pixels);
   for (int percent : kDistancePercentiles) {
