@@ -53,6 +53,12 @@ std::string Svg(const DrawnDisc& disc) {
                      disc.radius, paint);
 }
 
+std::string Svg(const DrawnBox& box) {
+  const Vec2d size = box.high - box.low;
+  return fmt::format(R"(<rect x="{:.2f}" y="{:.2f}" width="{:.2f}" height="{:.2f}" fill="{}"/>)", box.low.x(),
+                     box.low.y(), size.x(), size.y(), Hex(box.color));
+}
+
 std::string Svg(const DrawnText& text) {
   const char* anchor = text.align == TextAlign::kLeft     ? "start"
                        : text.align == TextAlign::kCentre ? "middle"
@@ -125,6 +131,12 @@ void Rasterize(const DrawnDisc& disc, double scale, Image8* image) {
   }
 }
 
+void Rasterize(const DrawnBox& box, double scale, Image8* image) {
+  const Vec2d middle = scale / 2 * (box.low + box.high), half = scale / 2 * (box.high - box.low);
+  Paint(image, middle - half, middle + half, 0, box.color,
+        [&](const Vec2d& p) { return ((p - middle).cwiseAbs() - half).maxCoeff(); });
+}
+
 void Rasterize(const DrawnText& text, double scale, Image8* image) {
   DrawText(image, static_cast<int>(std::lround(scale * text.at.x())),
            static_cast<int>(std::lround(scale * text.at.y())),
@@ -140,6 +152,10 @@ void Place(const Drawing& drawing, double x, double y, Drawing* page) {
                             for (Vec2d& point : line.points) point += corner;
                           },
                           [&](DrawnDisc& disc) { disc.centre += corner; },
+                          [&](DrawnBox& box) {
+                            box.low += corner;
+                            box.high += corner;
+                          },
                           [&](DrawnText& text) { text.at += corner; }},
                shape);
     page->shapes.push_back(std::move(shape));

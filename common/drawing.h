@@ -1,4 +1,4 @@
-// Pictures made of lines, discs and text, written as SVG or as pixels from one list.
+// Pictures made of lines, discs, boxes and text, written as SVG or as pixels from one list.
 #pragma once
 
 #include <string>
@@ -25,6 +25,11 @@ struct DrawnDisc {
   double ring = 0;  // width of a ring of that radius; 0 = filled
 };
 
+struct DrawnBox {
+  Vec2d low, high;  // corners
+  Rgb8 color;
+};
+
 struct DrawnText {
   Vec2d at;  // on the base line
   std::string text;
@@ -33,7 +38,7 @@ struct DrawnText {
   TextAlign align = TextAlign::kLeft;
 };
 
-using Shape = std::variant<DrawnLine, DrawnDisc, DrawnText>;
+using Shape = std::variant<DrawnLine, DrawnDisc, DrawnBox, DrawnText>;
 
 // On white, drawn in order.
 struct Drawing {

@@ -277,41 +277,6 @@ Drawing DrawPlot(const Plot& plot, double width, double height) {
   return PlotDrawer(plot, width, height).Draw();
 }
 
-Drawing DrawBars(const std::string& title, const std::vector<PlotBar>& bars, double width, double height) {
-  Drawing drawing{width, height, {}};
-  drawing.shapes.push_back(DrawnText{{kLeft, kTitle - 4}, title, kText + 1, kInk, TextAlign::kLeft});
-  double labels = 0, notes = 0, low = 0, high = 0;
-  for (const PlotBar& bar : bars) {
-    labels = std::max(labels, TextWidth(bar.label, kText));
-    notes = std::max(notes, TextWidth(bar.note, kText));
-    low = std::min(low, bar.value - bar.error);
-    high = std::max(high, bar.value + bar.error);
-  }
-  if (!(high > low)) high = low + 1;
-  const double from = labels + 16, to = width - kRight - notes - 8;
-  const auto pixel = [&](double value) { return from + (value - low) / (high - low) * (to - from); };
-  const double row = std::min(34.0, (height - kTop - kTitle) / std::max<double>(1, double(bars.size())));
-  double y = kTop + row / 2;
-  const auto line = [&](double a, double b, double thick, const Rgb8& color) {
-    drawing.shapes.push_back(DrawnLine{{{a, y}, {b, y}}, color, thick, false});
-  };
-  for (const PlotBar& bar : bars) {
-    // A line's ends are round, of which a bar has none: it is made of thin ones.
-    for (double offset = -row / 4; offset <= row / 4; offset += 0.5) {
-      drawing.shapes.push_back(
-          DrawnLine{{{pixel(0), y + offset}, {pixel(bar.value), y + offset}}, PlotColor(0), 1, false});
-    }
-    line(pixel(bar.value - bar.error), pixel(bar.value + bar.error), 1.5, kInk);
-    drawing.shapes.push_back(
-        DrawnText{{from - 10, y + kText / 3}, bar.label, kText, kInk, TextAlign::kRight});
-    const double end = pixel(std::max(0.0, bar.value + bar.error)) + 8;
-    drawing.shapes.push_back(DrawnText{{end, y + kText / 3}, bar.note, kText, kInk, TextAlign::kLeft});
-    y += row;
-  }
-  drawing.shapes.push_back(DrawnLine{{{pixel(0), kTop}, {pixel(0), y - row / 2}}, kInk, 1, false});
-  return drawing;
-}
-
 Rgb8 PlotColor(size_t index) {
   // Paul Tol's "bright" scheme and two darker ones, told apart by the colour-blind.
   static constexpr std::array<Rgb8, 8> kColors = {{{68, 119, 170},

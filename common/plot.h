@@ -39,16 +39,6 @@ struct Plot {
 // the points, lines and each other; one that finds no place is left out.
 Drawing DrawPlot(const Plot& plot, double width, double height);
 
-// A horizontal bar with a text on either side.
-struct PlotBar {
-  std::string label;  // left of the axis
-  double value = 0, error = 0;
-  std::string note;  // right of the bar
-};
-
-// Bars from 0, one below the other.
-Drawing DrawBars(const std::string& title, const std::vector<PlotBar>& bars, double width, double height);
-
 // Distinct colours for the curves of a plot.
 Rgb8 PlotColor(size_t index);
 

@@ -128,6 +128,18 @@ TEST(Drawing, PixelsAreWhereTheShapesAre) {
   }
 }
 
+TEST(Drawing, BoxesCoverTheirArea) {
+  Drawing drawing{20, 10, {}};
+  drawing.shapes.push_back(DrawnBox{{2.5, 3}, {12, 7}, {0, 0, 0}});
+  const Image8 image = ToImage(drawing);
+  double covered = 0;
+  for (int i = 0; i < image.width * image.height; ++i) covered += (255 - image.data[3 * i]) / 255.0;
+  EXPECT_NEAR(covered, 9.5 * 4, 0.1);
+  EXPECT_NEAR(image.Pixel(2, 4)[0], 127.5, 1);  // half of it
+  EXPECT_EQ(image.Pixel(3, 2)[0], 255);
+  EXPECT_EQ(image.Pixel(11, 6)[0], 0);
+}
+
 TEST(Drawing, SvgHoldsTheSameAndEscapesText) {
   Drawing part{10, 10, {}};
   part.shapes.push_back(DrawnLine{{{1, 2}, {3, 4}}, {255, 128, 0}, 2, true});

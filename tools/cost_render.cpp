@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "common/bar_chart.h"
 #include "common/error.h"
 #include "common/files.h"
 #include "common/progress.h"
@@ -115,7 +116,7 @@ Drawing Page(const RenderCost& cost) {
   Place(plot(cost.sampling, 0, "Pixels, against the scene's own light"), 0, 0, &page);
   Place(plot(cost.sampling, 1, "Means of 8×8 pixels, against the same"), kWidth, 0, &page);
   Place(plot(cost.transport, 0, "Pixels, against light followed to its end"), 0, kHeight, &page);
-  std::vector<PlotBar> bars;
+  std::vector<ChartBar> bars;
   for (const EffectCost& effect : cost.effects) {
     bars.push_back(
         {effect.name, effect.seconds, effect.seconds_error,
