@@ -44,15 +44,15 @@ Settings operator+(Settings a, const Settings& b) {
 // A scene with what it takes to trace its first frame.
 struct Subject {
   Scene scene;
-  RayScene wall;
-  std::vector<Vec3d> normals;
+  MovingWall walls;
+  std::shared_ptr<const WallMoment> wall;
   FrameSetup setup;
 
   explicit Subject(Scene from)
       : scene(std::move(from)),
-        wall(scene.geometry.mesh),
-        normals(scene.surface.coat ? VertexNormals(scene.geometry.mesh) : std::vector<Vec3d>()),
-        setup(scene, wall, normals, 0, 0) {}
+        walls(scene.geometry, {scene.peristalsis, scene.surface.coat.has_value()}),
+        wall(walls.At(0)),
+        setup(scene, *wall, 0, 0) {}
 };
 
 // guides: how many off the axis; 0 = one source at the camera.

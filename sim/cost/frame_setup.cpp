@@ -4,11 +4,10 @@
 
 namespace lumen {
 
-FrameSetup::FrameSetup(const Scene& scene, const RayScene& wall, const std::vector<Vec3d>& normals, int frame,
-                       uint64_t seed)
+FrameSetup::FrameSetup(const Scene& scene, const WallMoment& wall, int frame, uint64_t seed)
     : scene_(scene),
       frame_(frame),
-      path_scene_{&wall, &scene.surface, SurfaceSeed(seed), &normals},
+      path_scene_{&wall.rays, &scene.surface, SurfaceSeed(seed), &wall.vertex_normals},
       camera_(scene.calibration.camera),
       valid_(ValidPixels(scene.calibration)),
       photographer_(scene, valid_, seed) {

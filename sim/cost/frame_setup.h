@@ -3,8 +3,8 @@
 
 #include <cstdint>
 #include <optional>
-#include <vector>
 
+#include "sim/geometry/moving_wall.h"
 #include "sim/photographer.h"
 #include "sim/scene.h"
 
@@ -12,9 +12,8 @@ namespace lumen {
 
 class FrameSetup {
  public:
-  // Scene, wall and normals (VertexNormals of the wall; empty for a scene without a coat) are referred to.
-  FrameSetup(const Scene& scene, const RayScene& wall, const std::vector<Vec3d>& normals, int frame,
-             uint64_t seed);
+  // Scene and wall are referred to; the wall has vertex normals if the scene has a coat.
+  FrameSetup(const Scene& scene, const WallMoment& wall, int frame, uint64_t seed);
   FrameSetup(const FrameSetup&) = delete;
   FrameSetup& operator=(const FrameSetup&) = delete;
 

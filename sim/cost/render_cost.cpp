@@ -25,9 +25,9 @@ class CostMeasurement {
   CostMeasurement(const Scene& scene, const RenderCostOptions& options)
       : scene_(scene),
         options_(options),
-        wall_(scene.geometry.mesh),
-        normals_(scene.surface.coat ? VertexNormals(scene.geometry.mesh) : std::vector<Vec3d>()),
-        setup_(scene, wall_, normals_, options.frame, options.seed),
+        walls_(scene.geometry, {scene.peristalsis, scene.surface.coat.has_value()}),
+        wall_(walls_.At(options.frame)),
+        setup_(scene, *wall_, options.frame, options.seed),
         progress_("cost"),
         start_(WallSeconds()) {}
 
@@ -121,7 +121,7 @@ class CostMeasurement {
     for (const EffectSwitch& effect : SwitchesOf(scene_)) {
       Scene without = scene_;
       effect.switch_off(&without);
-      const FrameSetup setup(without, wall_, normals_, options_.frame, options_.seed);
+      const FrameSetup setup(without, *wall_, options_.frame, options_.seed);
       const auto start = WallSeconds();
       std::vector<double> on, off;
       // Short frames are taken oftener: their clock is coarser.
@@ -141,6 +141,18 @@ class CostMeasurement {
     }
     result_.frame_seconds = MedianOf(whole);
     result_.frame_seconds_error = MedianError(whole);
+    if (walls_.moves()) MeasureMovingWall();
+  }
+
+  // A wall that moves is built anew for every frame.
+  void MeasureMovingWall() {
+    std::vector<double> seconds;
+    for (int run = 0; run < options_.runs; ++run) {
+      seconds.push_back(CpuSecondsOf([&] { walls_.At(options_.frame + 1 + run); }));
+    }
+    result_.effects.push_back({"peristalsis", MedianOf(seconds), MedianError(seconds)});
+    result_.frame_seconds += MedianOf(seconds);
+    result_.frame_seconds_error = std::hypot(result_.frame_seconds_error, MedianError(seconds));
   }
 
   Luminance Measure(const PathOptions& options, uint64_t seed) const {
@@ -153,8 +165,8 @@ class CostMeasurement {
 
   const Scene& scene_;
   const RenderCostOptions& options_;
-  RayScene wall_;
-  std::vector<Vec3d> normals_;
+  MovingWall walls_;
+  std::shared_ptr<const WallMoment> wall_;
   FrameSetup setup_;
   Progress progress_;
   double start_;
