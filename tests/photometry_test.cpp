@@ -421,9 +421,9 @@ TEST_F(PhotometryCommand, LeavesOutFramesThatShowNothingAndRefusesASequenceWitho
 }
 
 // C3VD's frame under one light at the camera, against an analysis of the same frame by other code (least
-// squares on log(I^2.2), over 1.3 million unsaturated pixels). Which of the darkest, flattest and brightest
-// pixels that one took isn't on record; the choice moves the figures by as much as the tolerances, a fraction
-// of the standard errors, which the frame's 136 places leave at 0.08 for the exponents.
+// squares on log(I^2.2), over 1.3 million unsaturated pixels). Which of the darkest, flattest, brightest and
+// outermost pixels that one took isn't on record; the choice moves the figures by as much as the tolerances,
+// a fraction of the standard errors, which the frame's 136 places leave at 0.08 for the exponents.
 TEST(Photometry, RealFrameBearsTheModelOut) {
   LUMEN_NEEDS_DATA("c3vd/trans_t4_a_frame0010");
   Sequence sequence = ReadSequence(SharedData("c3vd/trans_t4_a_frame0010"));
@@ -449,7 +449,7 @@ TEST(Photometry, RealFrameBearsTheModelOut) {
     };
     expect_parameter(Parameter::kTExponent, t_exponent, 0.05);
     expect_parameter(Parameter::kCosExponent, cos_exponent, 0.04);
-    expect_parameter(Parameter::kSpread, spread, 0.02);
+    expect_parameter(Parameter::kSpread, spread, 0.03);
     expect(fit.r_squared, fit.r_squared_error, r_squared, 0.03);
     expect(fit.residual, fit.residual_error, 0.41, 0.01);
     EXPECT_NEAR(fit.count, 1.3e6, 0.05e6);

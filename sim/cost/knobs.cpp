@@ -10,8 +10,9 @@ namespace {
 Knob NumberKnob(const std::string& name, bool biased, const PathOptions& own, std::vector<int> values,
                 int own_value, const std::function<void(int, PathOptions*)>& set,
                 const std::function<double(int)>& work) {
-  if (std::ranges::find(values, own_value) == values.end()) values.push_back(own_value);
+  values.push_back(own_value);
   std::ranges::sort(values);
+  values.erase(std::unique(values.begin(), values.end()), values.end());
   Knob knob{name, biased, {}};
   for (int value : values) {
     KnobSetting setting{std::to_string(value), own, work(value), value == own_value};
@@ -30,10 +31,12 @@ std::vector<Knob> KnobsOf(const Scene& scene) {
       "samples", false, own, {1, 2, 4, 8, 16, 32, 64, 128, 256}, own.samples,
       [](int n, PathOptions* options) { options->samples = n; },
       [&](int n) { return double(n) / own.samples; }));
-  // Roulette begins with the bounce after those that are free of it.
+  // As many free of it as there are bounces: none plays it.
   if (own.bounces > 0) {
     knobs.push_back(NumberKnob(
-        "roulette_after", false, own, {0, 1, 2, 4, own.bounces}, std::min(own.roulette_after, own.bounces),
+        "roulette_after", false, own,
+        {0, std::min(1, own.bounces), std::min(2, own.bounces), std::min(4, own.bounces), own.bounces},
+        std::min(own.roulette_after, own.bounces),
         [](int n, PathOptions* options) { options->roulette_after = n; }, [](int) { return 1.0; }));
   }
   knobs.push_back(NumberKnob(
