@@ -69,5 +69,38 @@ TEST_F(EffectsTest, LensAndRecorderChangeThePictureOnly) {
   }
 }
 
+// Light from wall to wall comes on top of direct light, whose every bit stays.
+TEST_F(EffectsTest, InterreflectionLeavesDirectLightAlone) {
+  const std::string exact = "truth.exact=[\"direct\", \"albedo\", \"z\"]",
+                    gain = "sensor.auto_gain.target=0.4";
+  const fs::path with = RenderTo("with", {exact, gain});
+  EXPECT_EQ(Differing(with, RenderTo("without", {exact, gain, "path.bounces=0"})),
+            (Names{"0001_color.png", "sequence.toml"}));
+}
+
+// The wall's colour is no part of its shape; the loop of gain sees it.
+TEST_F(EffectsTest, TextureLeavesGeometryAlone) {
+  const std::string exact =
+      "truth.exact=[\"z\", \"distance\", \"normal\", \"shading_normal\", \"position\", "
+      "\"flow\", \"seen_before\", \"flow_next\", \"seen_after\", \"visibility\"]";
+  const fs::path with = RenderTo("with", {exact});
+  for (const std::string setting : {"surface.mottling.contrast=0.5", "surface.vessels.width_mm=2"}) {
+    EXPECT_EQ(Differing(with, RenderTo("other", {exact, setting})),
+              (Names{"0001_color.png", "sequence.toml"}))
+        << setting;
+  }
+}
+
+// Vignetting and gain belong to the picture, not to the light that is there.
+TEST_F(EffectsTest, VignettingAndGainLeaveRadianceAlone) {
+  const std::string exact = "truth.exact=[\"radiance\", \"direct\", \"indirect\", \"albedo\", \"z\"]";
+  const fs::path with = RenderTo("with", {exact});
+  for (const std::string setting : {"response.vignetting=0", "sensor.auto_gain.target=0.6"}) {
+    EXPECT_EQ(Differing(with, RenderTo("other", {exact, setting})),
+              (Names{"0001_color.png", "sequence.toml"}))
+        << setting;
+  }
+}
+
 }  // namespace
 }  // namespace lumen
