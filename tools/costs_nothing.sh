@@ -17,8 +17,9 @@ command -v valgrind >/dev/null || { echo "costs_nothing: valgrind is missing: ap
 
 folder=${LUMEN_BUILD:-build}/callgrind
 mkdir -p "$folder"
+folder=$(cd "$folder" && pwd)
 scratch=$(mktemp -d)
-trap 'rm -rf "$scratch"; git worktree prune' EXIT
+trap 'rm -rf "$scratch"' EXIT
 
 cat >"$scratch/plain.toml" <<'SCENE'
 geometry = {kind = "colon", length_mm = 50, tolerance_mm = 0.3}
@@ -47,10 +48,11 @@ count() {  # PROGRAM OUT SCENE ARGUMENT...: callgrind's file OUT.callgrind, fram
     { tail -n 5 "$out.log" >&2; exit 1; }
 }
 
-# Instructions whose source lies in a file named NAME.h or NAME.cpp, wherever they were inlined.
+# Instructions whose source lies in a file named NAME.h or NAME.cpp, wherever they were inlined; without what the
+# program initialises at its start, whatever the scene.
 of_effect() {  # CALLGRIND_FILE NAME
   callgrind_annotate --threshold=100 --show-percs=no --auto=no "$1" |
-    awk -v name="/$2[.](h|cpp):" '$2 ~ name {gsub(",", "", $1); sum += $1} END {print sum + 0}'
+    awk -v name="/$2[.](h|cpp):" '$2 ~ name && !/:_GLOBAL__sub_I_/ {gsub(",", "", $1); sum += $1} END {print sum + 0}'
 }
 
 total() { awk '/^(summary|totals):/ {print $2; exit}' "$1"; }
@@ -74,9 +76,13 @@ for header in $(grep -rlE '^// Effect:' sim --include='*.h' | sort); do
 done
 
 if [ $# -gt 0 ]; then
-  git worktree add --quiet --detach "$scratch/sources" "$1"
-  build "$scratch/sources" "$folder/there"
-  git worktree remove --force "$scratch/sources"
+  # The sources stay where they are, so that the next comparison compiles what changed.
+  if [ -d "$folder/sources" ]; then
+    git -C "$folder/sources" checkout --quiet --detach "$(git rev-parse "$1")"
+  else
+    git worktree add --quiet --detach "$folder/sources" "$1"
+  fi
+  build "$folder/sources" "$folder/there"
   # Only what traces paths: reading scenes and writing files may change with what there is to read and write.
   toggle=(--toggle-collect='lumen::RenderFrame(*')
   count "$program" "$scratch/here" "$scratch/plain.toml"
