@@ -163,6 +163,34 @@ std::optional<Vec3<T>> Camera<T>::Unproject(const Vec2<T>& pixel) const {
 }
 
 template <class T>
+LanesI Camera<T>::Unproject(const Lanes& x, const Lanes& y, Lanes3* direction) const
+  requires std::same_as<T, float>
+{
+  if (intrinsics_.model == CameraModel::kKannalaBrandt) {  // solves for the angle, pixel by pixel
+    LanesI seen{};
+    for (int i = 0; i < kLanes; ++i) {
+      const std::optional<Vec3f> ray = Unproject(Vec2f(x[i], y[i]));
+      direction->Set(i, ray.value_or(Vec3f(0, 0, 1)));
+      seen[i] = ray ? -1 : 0;
+    }
+    return seen;
+  }
+  const auto& from_pixel = plane_from_pixel_;
+  const Lanes dx = x - centre_.x(), dy = y - centre_.y();
+  const Lanes plane_x = from_pixel(0, 0) * dx + from_pixel(0, 1) * dy;
+  const Lanes plane_y = from_pixel(1, 0) * dx + from_pixel(1, 1) * dy;
+  const Lanes radius = Sqrt(plane_x * plane_x + plane_y * plane_y);
+  const LanesI seen = radius <= max_radius_;
+  Lanes z = Broadcast(1);
+  if (intrinsics_.model == CameraModel::kScaramuzza) {
+    z = Broadcast(polynomial_.back());
+    for (size_t i = polynomial_.size() - 1; i-- > 0;) z = z * radius + polynomial_[i];
+  }
+  *direction = Select(seen, Normalized({plane_x, plane_y, z}), Broadcast(Vec3f(0, 0, 1)));
+  return seen;
+}
+
+template <class T>
 std::optional<Vec2<T>> Camera<T>::Project(const Vec3<T>& point) const {
   const T sideways = point.template head<2>().norm();
   const T z = point.z();

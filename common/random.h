@@ -8,12 +8,15 @@ namespace lumen {
 
 // A bijective mixer of 64 bits (the finaliser of SplitMix64: Steele, Lea, Flood, "Fast splittable
 // pseudorandom number generators", OOPSLA 2014).
-constexpr uint64_t Mix64(uint64_t x) {
+// T: uint64_t, or a vector of them.
+template <class T>
+constexpr T MixEach64(T x) {
   x += 0x9e3779b97f4a7c15ull;
   x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9ull;
   x = (x ^ (x >> 27)) * 0x94d049bb133111ebull;
   return x ^ (x >> 31);
 }
+constexpr uint64_t Mix64(uint64_t x) { return MixEach64(x); }
 
 // 64 random bits of (seed, a, b, c).
 constexpr uint64_t RandomBits(uint64_t seed, uint64_t a, uint64_t b = 0, uint64_t c = 0) {

@@ -143,6 +143,7 @@ void FillRays(const RayPacket& rays, RTCRay16* out, int valid[RayPacket::kSize])
 struct RayScene::State {
   const Mesh* mesh;
   Vec3d anchor;
+  std::vector<Vec3f> face_normals;
   RTCScene scene;
 
   explicit State(const Mesh& mesh) : mesh(&mesh), anchor(Vec3d::Zero()) {
@@ -151,6 +152,13 @@ struct RayScene::State {
       Eigen::AlignedBox3d box;
       for (const Vec3d& vertex : mesh.vertices) box.extend(vertex);
       anchor = box.center();
+    }
+    face_normals.reserve(mesh.faces.size());
+    for (const Vec3i& face : mesh.faces) {
+      const Vec3d& a = mesh.vertices[face[0]];
+      const Vec3d normal = (mesh.vertices[face[1]] - a).cross(mesh.vertices[face[2]] - a);
+      const double length = normal.norm();
+      face_normals.push_back(length > 0 ? (normal / length).cast<float>() : Vec3f(Vec3f::Zero()));
     }
     const RTCDevice device = SharedDevice();
     scene = rtcNewScene(device);
@@ -228,15 +236,16 @@ void RayScene::Intersect(const RayPacket& rays, HitPacket* hits) const {
   }
 }
 
-void RayScene::Occluded(const RayPacket& rays, uint8_t occluded[RayPacket::kSize]) const {
+LanesI RayScene::Occluded(const RayPacket& rays) const {
   RTCRay16 query;
   alignas(64) int valid[RayPacket::kSize];
   FillRays(rays, &query, valid);
   Trace(state_->scene, valid, &query);
-  for (int i = 0; i < RayPacket::kSize; ++i) {
-    occluded[i] = valid[i] && query.tfar[i] == -std::numeric_limits<float>::infinity();
-  }
+  // Rays that are off keep their tfar, which isn't infinite.
+  return Load(query.tfar) == -std::numeric_limits<float>::infinity();
 }
+
+const std::vector<Vec3f>& RayScene::face_normals() const { return state_->face_normals; }
 
 double RayScene::ExactDistance(uint32_t face, const Vec3d& origin, const Vec3d& direction) const {
   const Vec3i& corners = state_->mesh->faces[face];

@@ -5,6 +5,7 @@
 #include <memory>
 #include <vector>
 
+#include "common/lanes.h"
 #include "common/math.h"
 #include "common/mesh.h"
 
@@ -22,7 +23,7 @@ struct RayHit {
 // Sixteen rays with a common origin or nearly so (a pixel block's primary rays, their shadow rays): structure
 // of arrays, as packets want it. A lane with tfar < tnear is off.
 struct alignas(64) RayPacket {
-  static constexpr int kSize = 16;
+  static constexpr int kSize = kLanes;
   float origin[3][kSize];
   float direction[3][kSize];
   float tnear[kSize], tfar[kSize];
@@ -56,8 +57,11 @@ class RayScene {
   RayHit Intersect(const Vec3f& origin, const Vec3f& direction, float tnear, float tfar) const;
   bool Occluded(const Vec3f& origin, const Vec3f& direction, float tnear, float tfar) const;
   void Intersect(const RayPacket& rays, HitPacket* hits) const;
-  // occluded[i] = 1 where ray i meets anything.
-  void Occluded(const RayPacket& rays, uint8_t occluded[RayPacket::kSize]) const;
+  // −1 in the lanes whose ray meets anything, 0 in the others.
+  LanesI Occluded(const RayPacket& rays) const;
+
+  // Unit normals of the faces, by the order of their corners; 0 for a face without area. Computed in double.
+  const std::vector<Vec3f>& face_normals() const;
 
   // Distance in double to the plane of a face that a float ray has found, in world coordinates; the ground
   // truth's depth. Units of the direction's length; never outside the face's corners along the ray, so that

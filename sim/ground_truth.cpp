@@ -11,7 +11,6 @@
 namespace lumen {
 namespace {
 
-constexpr int kLanes = RayPacket::kSize;
 constexpr float kInfinity = std::numeric_limits<float>::infinity();
 constexpr float kNothing = std::numeric_limits<float>::quiet_NaN();
 
@@ -218,8 +217,7 @@ void StoreMotion(const Eye& eye, const Eye& neighbour, const Block& block, const
     candidate[lane] = true;
     SetRay(&packet, lane, direction, 0, reach);
   }
-  uint8_t occluded[kLanes];
-  neighbour.wall.Occluded(packet, occluded);
+  const LanesI occluded = neighbour.wall.Occluded(packet);
   for (int lane = 0; lane < block.count; ++lane) {
     if (candidate[lane] && !occluded[lane]) *seen->Pixel(block.x[lane], block.y) = 1;
   }

@@ -277,12 +277,56 @@ TEST(Coat, ReliefFollowsItsHeight) {
       slope[d] = (height(place + along) - height(place - along)) / (2 * step);
     }
     const Vec3d n = smooth.cast<double>(), expected = (n - slope + slope.dot(n) * n).normalized();
-    const Vec3d found = coat.ReliefNormal(seed, place, smooth).cast<double>();
+    const Vec3d found = coat.ReliefNormal(seed, Broadcast(place), Broadcast(smooth))[3].cast<double>();
     EXPECT_LT((found - expected).norm(), 2e-3) << i;
     tilts += found.cross(n).norm() / 300;
   }
   EXPECT_GT(tilts, 0.02);
-  EXPECT_EQ(Coat({1.37, 0.2, 0.5, 0}).ReliefNormal(seed, {1, 2, 3}, Vec3f::UnitX()), Vec3f::UnitX());
+  const Coat flat({1.37, 0.2, 0.5, 0});
+  EXPECT_EQ(flat.ReliefNormal(seed, Broadcast(Vec3f(1, 2, 3)), Broadcast(Vec3f::UnitX()))[0], Vec3f::UnitX());
+}
+
+// Lanes against one place at a time; the glint's own sampling against its lobe over its density.
+TEST(Coat, LanesAndGlintsAreTheLobes) {
+  for (const double roughness : {0.05, 0.3, 1.0}) {
+    const Coat coat({1.37, roughness, 0.5, 0.05});
+    CoatedLanes places;
+    Lanes3 incoming;
+    int glints = 0;
+    for (int i = 0; i < 200; ++i) {
+      for (int lane = 0; lane < kLanes; ++lane) {
+        const Vec2f a = RandomPair(20, i * kLanes + lane), b = RandomPair(21, i * kLanes + lane);
+        const Vec3f out = Direction(a[0], 6 * a[1]);
+        const Vec3f mirror(-out[0], -out[1], out[2]);
+        places.normal.Set(lane, Vec3f::UnitZ());
+        places.albedo.Set(lane, {0.8f, 0.4f, 0.3f});
+        places.outgoing.Set(lane, out);
+        places.coat_normal.Set(lane, Direction(1 - 0.05 * b[0], 6 * b[1]));
+        incoming.Set(lane, (mirror + 0.3f * Direction(2 * b[1] - 1, 6 * b[0])).normalized());
+        places.reflectance[lane] = coat.Reflectance(places.coat_normal[lane].dot(out));
+      }
+      const CoatLobesLanes lobes = coat.Eval(places, incoming);
+      for (int lane = 0; lane < kLanes; ++lane) {
+        const CoatLobes expected = coat.Eval(places[lane], incoming[lane]);
+        EXPECT_LT((lobes.base[lane] - expected.base).norm(), 1e-5f * (1 + expected.base.norm()));
+        EXPECT_NEAR(lobes.glint[lane], expected.glint, 1e-3f * expected.glint + 1e-6f);
+        const Coat::Glint glint = coat.SampleGlint(places[lane], RandomPair(22, i * kLanes + lane));
+        EXPECT_LE(glint.weight, 1);
+        if (glint.weight == 0) continue;
+        // Pdf of the glint alone: its share is what the mixture's density has beyond the wall's.
+        const CoatLobes sampled = coat.Eval(places[lane], glint.incoming);
+        const Vec3f half = (glint.incoming + places.outgoing[lane]).normalized();
+        const Vec3f& s = places.coat_normal[lane];
+        const float density =
+            ggx::ReflectedPdf(coat.alpha(),
+                              ggx::Distribution(coat.alpha(), half.dot(s), half.cross(s).squaredNorm()),
+                              places.outgoing[lane].dot(s));
+        EXPECT_NEAR(sampled.glint / density, glint.weight, 2e-3f * glint.weight);
+        ++glints;
+      }
+    }
+    EXPECT_GT(glints, 1000) << roughness;
+  }
 }
 
 // Roughness 0 with the light in the mirror direction, the worst there is: the documented least α.

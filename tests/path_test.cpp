@@ -11,6 +11,7 @@
 #include "common/parallel.h"
 #include "common/random.h"
 #include "sim/ground_truth.h"
+#include "sim/imaging/offset_origin.h"
 
 namespace lumen {
 namespace {

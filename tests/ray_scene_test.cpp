@@ -277,15 +277,14 @@ TEST(RayScene, PacketsEqualSingleRays) {
   for (size_t first = 0; first < rays.size(); first += RayPacket::kSize) {
     const RayPacket packet = PacketOf(rays, first);
     HitPacket found;
-    uint8_t occluded[RayPacket::kSize];
     scene.Intersect(packet, &found);
-    scene.Occluded(packet, occluded);
+    const LanesI occluded = scene.Occluded(packet);
     for (int lane = 0; lane < RayPacket::kSize; ++lane) {
       const Ray& ray = rays[first + lane];
       RayHit expected;
       if (lane % 5 != 4) expected = scene.Intersect(ray.origin, ray.direction, 0, 25);
       EXPECT_EQ(found.face[lane] != kNoFace, expected.hit());
-      EXPECT_EQ(occluded[lane], expected.hit());
+      EXPECT_EQ(occluded[lane] != 0, expected.hit());
       EXPECT_NEAR(found.t[lane], expected.t, 1e-5);
       if (found.face[lane] != expected.face) {
         ++ties;

@@ -98,22 +98,33 @@ TEST(Surface, VesselsAbsorb) {
   EXPECT_LT(vessel, count / 3);
 }
 
-TEST(Surface, SixteenPlacesAtOnceAreTheSameBits) {
+// Lanes in one cell of the noise's lattice and lanes all over it take different ways through the code.
+TEST(Surface, NoiseInLanesIsTheSameBits) {
+  for (const float extent : {0.02f, 40.0f}) {
+    for (int packet = 0; packet < 1000; ++packet) {
+      Lanes3 points;
+      const Vec3f middle = RandomPoint(14, packet, 60);
+      for (int i = 0; i < kLanes; ++i) {
+        points.Set(i, middle + RandomPoint(15, packet * kLanes + i, extent));
+      }
+      const Lanes noise = GradientNoise(7, points);
+      for (int i = 0; i < kLanes; ++i) ASSERT_EQ(noise[i], GradientNoise(7, points[i])) << packet << ' ' << i;
+    }
+  }
+}
+
+TEST(Surface, AlbedoOfALaneIsItsOwn) {
   Surface surface;
   surface.mottling.emplace();
   surface.vessels = Vessels{9, 2, Vec3d(0.15, 0.7, 0.5)};
   int in_vessels = 0;
   for (int packet = 0; packet < 1000; ++packet) {
-    Lanes3 places, albedos;
-    for (int i = 0; i < Lanes3::kSize; ++i) {
-      const Vec3f place = RandomPoint(14, packet * Lanes3::kSize + i, 60);
-      for (int c = 0; c < 3; ++c) places.c[c][i] = place[c];
-    }
-    AlbedoAt(surface, 7, places, &albedos);
-    for (int i = 0; i < Lanes3::kSize; ++i) {
-      const Vec3f one = AlbedoAt(surface, 7, {places.c[0][i], places.c[1][i], places.c[2][i]});
-      for (int c = 0; c < 3; ++c) ASSERT_EQ(albedos.c[c][i], one[c]) << packet << ' ' << i;
-      in_vessels += one.z() < 0.85f * one.x() * 0.3f / 0.8f;
+    Lanes3 places;
+    for (int i = 0; i < kLanes; ++i) places.Set(i, RandomPoint(14, packet * kLanes + i, 60));
+    const Lanes3 albedos = AlbedoAt(surface, 7, places);
+    for (int i = 0; i < kLanes; ++i) {
+      ASSERT_EQ(albedos[i], AlbedoAt(surface, 7, places[i])) << packet << ' ' << i;
+      in_vessels += albedos.z[i] < 0.85f * albedos.x[i] * 0.3f / 0.8f;
     }
   }
   EXPECT_GT(in_vessels, 100);

@@ -118,15 +118,22 @@ float Coat::Reflectance(float cosine) const {
          (place - static_cast<float>(below)) * (reflectance_[below + 1] - reflectance_[below]);
 }
 
-Vec3f Coat::ReliefNormal(uint64_t seed, const Vec3f& place_mm, const Vec3f& smooth) const {
+Lanes Coat::Reflectance(const Lanes& cosine) const {
+  const Lanes zero = Broadcast(0), one = Broadcast(1);
+  const Lanes place = Sqrt(Min(Max(cosine, zero), one)) * float(kEntries - 1);
+  const LanesI whole = Truncate(place), below = whole > kEntries - 2 ? BroadcastI(kEntries - 2) : whole;
+  const Lanes low = Gather(reflectance_.data(), below), high = Gather(reflectance_.data(), below + 1);
+  return low + (place - ToFloat(below)) * (high - low);
+}
+
+Lanes3 Coat::ReliefNormal(uint64_t seed, const Lanes3& places_mm, const Lanes3& smooth) const {
   if (relief_height_mm_ == 0) return smooth;
   // Height h·(noise(p/l) + noise(2p/l)/2)/1.5, as the mottling's clouds: both octaves have like slopes.
-  const Vec3f place = place_mm / relief_mm_;
-  const Vec3f slope =
-      (relief_height_mm_ / (1.5f * relief_mm_)) *
-      (NoiseGradient(seed + kReliefSeeds, place) + NoiseGradient(seed + kReliefSeeds + 1, 2 * place));
-  const Vec3f along = slope - slope.dot(smooth) * smooth;
-  return (smooth - along).normalized();
+  const Lanes3 place = places_mm * Broadcast(1 / relief_mm_);
+  const Lanes3 slope = (NoiseGradient(seed + kReliefSeeds, place) +
+                        NoiseGradient(seed + kReliefSeeds + 1, place * Broadcast(2))) *
+                       Broadcast(relief_height_mm_ / (1.5f * relief_mm_));
+  return Normalized(smooth - (slope - smooth * Dot(slope, smooth)));
 }
 
 float Coat::GlintBrdf(const Vec3f& normal, const Vec3f& incoming, const Vec3f& outgoing) const {
@@ -144,6 +151,36 @@ CoatLobes Coat::Eval(const CoatedPlace& place, const Vec3f& incoming) const {
   const float share = (1 - place.reflectance) * (1 - Reflectance(coat_cosine)) / (1 - mean_reflectance_);
   return {share * cosine * lambert::Eval(place.albedo),
           coat_cosine > 0 ? coat_cosine * GlintBrdf(place.coat_normal, incoming, place.outgoing) : 0.0f};
+}
+
+Lanes Coat::Transmission(const CoatedLanes& places, const Lanes3& incoming) const {
+  return (1.0f - places.reflectance) * (1.0f - Reflectance(Dot(incoming, places.coat_normal))) *
+         (1 / (1 - mean_reflectance_));
+}
+
+CoatLobesLanes Coat::Eval(const CoatedLanes& places, const Lanes3& incoming) const {
+  const Lanes zero{};
+  const Lanes cosine = Dot(incoming, places.normal), cos_in = Dot(incoming, places.coat_normal);
+  const Lanes cos_out = Dot(places.outgoing, places.coat_normal);
+  const LanesI lit = cosine > 0.0f;
+  CoatLobesLanes lobes;
+  lobes.base = places.albedo * (lit ? Transmission(places, incoming) * cosine * kInversePi : zero);
+  lobes.glint = zero;
+  const LanesI mirrors = lit & (cos_in > 0.0f) & (cos_out > 0.0f);
+  if (!Any(mirrors)) return lobes;
+  const Lanes3 half = Normalized(incoming + places.outgoing), across = Cross(half, places.coat_normal);
+  const Lanes along = Dot(half, places.coat_normal), squared = Broadcast(alpha_ * alpha_);
+  const Lanes spread = squared * along * along + Dot(across, across);
+  const auto slant = [&](const Lanes& c) { return Sqrt(squared + (1.0f - squared) * c * c); };
+  const Lanes visibility = 0.5f / (cos_out * slant(cos_in) + cos_in * slant(cos_out));
+  const Lanes c = Min(Max(Dot(half, places.outgoing), zero), Broadcast(1));
+  const Lanes refracted = Sqrt(1.0f - (1.0f - c * c) * (1 / (ior_ * ior_)));
+  const Lanes parallel = (ior_ * c - refracted) / (ior_ * c + refracted);
+  const Lanes perpendicular = (c - ior_ * refracted) / (c + ior_ * refracted);
+  const Lanes fresnel = 0.5f * (parallel * parallel + perpendicular * perpendicular);
+  const Lanes glint = cos_in * fresnel * visibility * (squared * kInversePi / (spread * spread));
+  lobes.glint = mirrors & (along > 0.0f) ? glint : zero;
+  return lobes;
 }
 
 // How many of the sampled directions are the coat's: its part of what leaves the place.
@@ -164,14 +201,31 @@ float Coat::Pdf(const CoatedPlace& place, const Vec3f& incoming) const {
   return pdf;
 }
 
-Vec3f Coat::Sample(const CoatedPlace& place, const Vec2f& random, float choice) const {
-  if (!(choice < GlintShare(place))) return lambert::Sample(place.normal, random);
+Vec3f Coat::Mirrored(const CoatedPlace& place, const Vec2f& random) const {
   const TangentFrame frame(place.coat_normal);
   const Vec3f& out = place.outgoing;
   const Vec3f local = ggx::SampleVisibleNormal(
       alpha_, {out.dot(frame.tangent), out.dot(frame.bitangent), out.dot(place.coat_normal)}, random);
   const Vec3f half = local[0] * frame.tangent + local[1] * frame.bitangent + local[2] * place.coat_normal;
   return (2 * out.dot(half) * half - out).normalized();
+}
+
+Vec3f Coat::Sample(const CoatedPlace& place, const Vec2f& random, float choice) const {
+  if (!(choice < GlintShare(place))) return lambert::Sample(place.normal, random);
+  return Mirrored(place, random);
+}
+
+Coat::Glint Coat::SampleGlint(const CoatedPlace& place, const Vec2f& random) const {
+  const float cos_out = place.outgoing.dot(place.coat_normal);
+  if (!(cos_out > 0)) return {Vec3f::Zero(), 0};
+  const Vec3f incoming = Mirrored(place, random);
+  const float cos_in = incoming.dot(place.coat_normal);
+  if (!(cos_in > 0 && incoming.dot(place.normal) > 0)) return {Vec3f::Zero(), 0};
+  // F·G₂/G₁: the distribution is in lobe and density and falls out.
+  const float along = std::clamp((incoming + place.outgoing).normalized().dot(incoming), 0.0f, 1.0f);
+  const float masking =
+      ggx::Visibility(alpha_, cos_in, cos_out) * cos_in / ggx::ReflectedPdf(alpha_, 1, cos_out);
+  return {incoming, FresnelDielectric(ior_, along) * masking};
 }
 
 }  // namespace lumen

@@ -38,6 +38,7 @@
 #include <optional>
 
 #include "common/config.h"
+#include "common/lanes.h"
 #include "common/math.h"
 
 namespace lumen {
@@ -85,6 +86,20 @@ struct CoatLobes {
   float glint;
 };
 
+// Sixteen coated places at once.
+struct CoatedLanes {
+  Lanes3 normal, albedo, outgoing, coat_normal;
+  Lanes reflectance;
+  CoatedPlace operator[](int lane) const {
+    return {normal[lane], albedo[lane], outgoing[lane], coat_normal[lane], reflectance[lane]};
+  }
+};
+
+struct CoatLobesLanes {
+  Lanes3 base;
+  Lanes glint;
+};
+
 class Coat {
  public:
   explicit Coat(const CoatOptions& options);
@@ -97,20 +112,34 @@ class Coat {
   float Reflectance(float cosine) const;
   float mean_reflectance() const { return mean_reflectance_; }
 
-  // The relief's normal where the mesh has the smooth normal `smooth`; place: mm, as for AlbedoAt.
-  Vec3f ReliefNormal(uint64_t seed, const Vec3f& place_mm, const Vec3f& smooth) const;
+  Lanes Reflectance(const Lanes& cosine) const;
+
+  // The relief's normals where the mesh has the smooth normals `smooth`; places: mm, as for AlbedoAt.
+  Lanes3 ReliefNormal(uint64_t seed, const Lanes3& places_mm, const Lanes3& smooth) const;
 
   // Eval, sample, pdf, for incoming directions that point away from the surface.
   CoatLobes Eval(const CoatedPlace& place, const Vec3f& incoming) const;
+  // The same in sixteen places at once, to rounding.
+  CoatLobesLanes Eval(const CoatedLanes& places, const Lanes3& incoming) const;
+  // What the coat lets by of light that the wall scatters, over that of a wall without one.
+  Lanes Transmission(const CoatedLanes& places, const Lanes3& incoming) const;
   float Pdf(const CoatedPlace& place, const Vec3f& incoming) const;
   // choice: in [0, 1), picks the lobe. The direction may be below the wall, where Eval is 0.
   Vec3f Sample(const CoatedPlace& place, const Vec2f& random, float choice) const;
+  // A direction for the first lobe alone, and what that lobe sends on over the direction's density: at most 1.
+  // No direction (weight 0) where it is below the wall or there is no glint.
+  struct Glint {
+    Vec3f incoming;
+    float weight;
+  };
+  Glint SampleGlint(const CoatedPlace& place, const Vec2f& random) const;
 
  private:
   static constexpr int kEntries = 129;  // at equal steps of the cosine's root: E is smooth in it
 
   float GlintBrdf(const Vec3f& normal, const Vec3f& incoming, const Vec3f& outgoing) const;
   float GlintShare(const CoatedPlace& place) const;
+  Vec3f Mirrored(const CoatedPlace& place, const Vec2f& random) const;
   float QuadratureOfReflectance(float cosine) const;
 
   float ior_, alpha_, relief_mm_, relief_height_mm_;

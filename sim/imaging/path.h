@@ -19,6 +19,7 @@ struct PathOptions {
   int samples = 8;         // a pixel
   int bounces = 0;         // from wall to wall; 0 = direct light only
   int roulette_after = 2;  // bounces that every path may make before Russian roulette
+  int shared_paths = 32;   // that a tile's pixels share for each sample; 0 = a path for each pixel of its own
 };
 
 // What there is to see. All of it is referred to.
@@ -27,6 +28,8 @@ struct PathScene {
   const Surface* surface;
   uint64_t surface_seed;
   const std::vector<Vec3d>* vertex_normals = nullptr;  // VertexNormals of the wall, for a surface with a coat
+  const Mesh* rest = nullptr;  // the wall at rest, which carries the texture; none: the wall itself
+  Vec3d rest_anchor = Vec3d::Zero();  // RayScene::anchor of the wall at rest
 };
 
 struct View {
@@ -61,10 +64,5 @@ struct PathCount {
 // threads.
 PathCount RenderFrame(const PathScene& scene, const View& view, const PathOptions& options, uint64_t seed,
                       int frame, bool with_parts, Film* film);
-
-// The origin of a ray that leaves a surface at `point` to the side of `normal`: moved in units of the
-// coordinates' own floating-point steps, so that the ray can't meet the surface that it leaves (Wächter and
-// Binder 2019, "A fast and robust method for avoiding self-intersection", Ray Tracing Gems ch. 6).
-Vec3f OffsetOrigin(const Vec3f& point, const Vec3f& normal);
 
 }  // namespace lumen

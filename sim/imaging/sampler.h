@@ -5,12 +5,15 @@
 
 #include <cstdint>
 
+#include "common/lanes.h"
 #include "common/math.h"
 #include "common/random.h"
 
 namespace lumen {
 
-constexpr uint32_t ReverseBits(uint32_t x) {
+// The functions on bits take T = uint32_t, or a vector of them.
+template <class T>
+constexpr T ReverseBits(T x) {
   x = (x << 16) | (x >> 16);
   x = ((x & 0x00ff00ffu) << 8) | ((x & 0xff00ff00u) >> 8);
   x = ((x & 0x0f0f0f0fu) << 4) | ((x & 0xf0f0f0f0u) >> 4);
@@ -20,7 +23,8 @@ constexpr uint32_t ReverseBits(uint32_t x) {
 
 // Owen's scrambling on numbers whose bits run backwards: what becomes of a bit depends on the lower ones
 // only.
-constexpr uint32_t ScrambleReversed(uint32_t x, uint32_t seed) {
+template <class T>
+constexpr T ScrambleReversed(T x, T seed) {
   x += seed;
   x ^= x * 0x6c50b47cu;
   x ^= x * 0xb82f1e52u;
@@ -31,14 +35,16 @@ constexpr uint32_t ScrambleReversed(uint32_t x, uint32_t seed) {
 
 // A random permutation that keeps every aligned power-of-two block together: Owen's scrambling of the bits
 // from the highest down.
-constexpr uint32_t OwenScramble(uint32_t x, uint32_t seed) {
+template <class T>
+constexpr T OwenScramble(T x, T seed) {
   return ReverseBits(ScrambleReversed(ReverseBits(x), seed));
 }
 
 // Second dimension of Sobol's sequence with its bits backwards. Its direction numbers are the powers of the
 // polynomial x + 1, so bit j of the result is the sum mod 2 of C(k, j) over the index's bits k; by Lucas's
 // theorem C(k, j) is odd where j's binary digits are among k's. That sum over supersets takes a step a digit.
-constexpr uint32_t SobolSecondReversed(uint32_t index) {
+template <class T>
+constexpr T SobolSecondReversed(T index) {
   index ^= (index >> 1) & 0x55555555u;
   index ^= (index >> 2) & 0x33333333u;
   index ^= (index >> 4) & 0x0f0f0f0fu;
@@ -69,6 +75,40 @@ class Sampler {
 
   uint64_t key_;
   uint32_t sample_;
+};
+
+// Sixteen samplers at once, lane for lane the same numbers.
+class SamplerLanes {
+ public:
+  // pixels: the second argument of each lane's Sampler.
+  SamplerLanes(uint64_t seed, const uint64_t pixels[kLanes]) {
+    for (int i = 0; i < kLanes; ++i) (i < kLanes / 2 ? low_ : high_)[i % (kLanes / 2)] = pixels[i];
+    low_ = MixEach64(low_ ^ Mix64(seed));
+    high_ = MixEach64(high_ ^ Mix64(seed));
+  }
+
+  void Pair(const LanesU& samples, uint32_t pair, Lanes* u, Lanes* v) const {
+    const Keys low = MixEach64(low_ ^ uint64_t{pair}), high = MixEach64(high_ ^ uint64_t{pair});
+    const LanesU index = OwenScramble(samples, LowBits(low, high));
+    const Keys low_scrambles = MixEach64(low), high_scrambles = MixEach64(high);
+    const LanesU x = ScrambleReversed(index, LowBits(low_scrambles, high_scrambles));
+    const LanesU y =
+        ScrambleReversed(SobolSecondReversed(index), LowBits(low_scrambles >> 32, high_scrambles >> 32));
+    *u = ToUnit(ReverseBits(x));
+    *v = ToUnit(ReverseBits(y));
+  }
+
+ private:
+  using Keys = uint64_t __attribute__((vector_size(64)));  // of eight lanes
+
+  static LanesU LowBits(const Keys& low, const Keys& high) {
+    using Half = uint32_t __attribute__((vector_size(32)));
+    const Half first = __builtin_convertvector(low, Half), second = __builtin_convertvector(high, Half);
+    return __builtin_shufflevector(first, second, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+  }
+  static Lanes ToUnit(const LanesU& bits) { return ToFloat((LanesI)(bits >> 8)) * 0x1p-24f; }
+
+  Keys low_{}, high_{};
 };
 
 }  // namespace lumen

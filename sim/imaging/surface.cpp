@@ -32,75 +32,85 @@ float Lerp(float a, float b, float t) { return a + t * (b - a); }
 
 uint32_t NoiseSeed(uint64_t seed) { return static_cast<uint32_t>(Mix64(seed)); }
 
-[[gnu::always_inline]] inline float Noise(uint32_t seed, float px, float py, float pz) {
-  const float floor_x = std::floor(px), floor_y = std::floor(py), floor_z = std::floor(pz);
-  const float fx = px - floor_x, fy = py - floor_y, fz = pz - floor_z;
-  const int x = static_cast<int>(floor_x), y = static_cast<int>(floor_y), z = static_cast<int>(floor_z);
-  const auto corner = [=](int dx, int dy, int dz) {
-    return GradientDot(LatticeHash(seed, x + dx, y + dy, z + dz), fx - static_cast<float>(dx),
-                       fy - static_cast<float>(dy), fz - static_cast<float>(dz));
-  };
-  const float u = Quintic(fx), v = Quintic(fy), w = Quintic(fz);
-  const float low =
-      Lerp(Lerp(corner(0, 0, 0), corner(1, 0, 0), u), Lerp(corner(0, 1, 0), corner(1, 1, 0), u), v);
-  const float high =
-      Lerp(Lerp(corner(0, 0, 1), corner(1, 0, 1), u), Lerp(corner(0, 1, 1), corner(1, 1, 1), u), v);
-  const float value = Lerp(low, high, w);
-  // The noise's maximum is 1.04.
-  const float cut = value < 1 ? value : 1.0f;
-  return cut > -1 ? cut : -1.0f;
+// The noise's maximum is 1.04.
+float Cut(float noise) { return std::clamp(noise, -1.0f, 1.0f); }
+
+// A lattice point's gradients by the low four bits of its hash: components are ±1 or 0.
+const Lanes3 kSlopes = [] {
+  Lanes3 slopes;
+  // A gradient is that of a linear function, read off at unit steps.
+  for (uint32_t hash = 0; hash < kLanes; ++hash) {
+    slopes.Set(static_cast<int>(hash), {GradientDot(hash, 1, 0, 0), GradientDot(hash, 0, 1, 0),
+                                        GradientDot(hash, 0, 0, 1)});
+  }
+  return slopes;
+}();
+
+Lanes3 SlopesOf(const LanesU& hash) {
+  const LanesI entry = (LanesI)(hash & (kLanes - 1));
+  return {__builtin_shuffle(kSlopes.x, entry), __builtin_shuffle(kSlopes.y, entry),
+          __builtin_shuffle(kSlopes.z, entry)};
+}
+
+Lanes Quintic(const Lanes& t) { return t * t * t * (t * (t * 6.0f - 15.0f) + 10.0f); }
+Lanes Lerp(const Lanes& a, const Lanes& b, const Lanes& t) { return a + t * (b - a); }
+
+LanesU LatticeHash(uint32_t seed, const LanesI& x, const LanesI& y, const LanesI& z) {
+  LanesU h = seed + (LanesU)x * 0x8da6b343u + (LanesU)y * 0xd8163841u + (LanesU)z * 0xcb1ab31fu;
+  h = (h ^ (h >> 16)) * 0x85ebca6bu;
+  h = (h ^ (h >> 13)) * 0xc2b2ae35u;
+  return h ^ (h >> 16);
+}
+
+// Where points lie in the noise's lattice: their cells, and where in them.
+struct Cells {
+  explicit Cells(const Lanes3& point) : x(FloorInt(point.x)), y(FloorInt(point.y)), z(FloorInt(point.z)) {
+    offset = {point.x - ToFloat(x), point.y - ToFloat(y), point.z - ToFloat(z)};
+    one = !Any((x ^ x[0]) | (y ^ y[0]) | (z ^ z[0]));
+  }
+  Lanes3 Offset(int dx, int dy, int dz) const {
+    return {offset.x - static_cast<float>(dx), offset.y - static_cast<float>(dy),
+            offset.z - static_cast<float>(dz)};
+  }
+  // Gradients of a corner. Rays of neighbouring pixels mostly meet one cell: then it is looked up once.
+  Lanes3 Slopes(uint32_t seed, int dx, int dy, int dz) const {
+    if (one) return Broadcast(kSlopes[LatticeHash(seed, x[0] + dx, y[0] + dy, z[0] + dz) % kLanes]);
+    return SlopesOf(LatticeHash(seed, x + dx, y + dy, z + dz));
+  }
+
+  LanesI x, y, z;
+  Lanes3 offset;
+  bool one;
+};
+
+Lanes Noise(uint32_t seed, const Lanes3& point) {
+  const Cells cells(point);
+  Lanes corners[8];
+  for (int i = 0; i < 8; ++i) {
+    const int dx = i & 1, dy = i >> 1 & 1, dz = i >> 2;
+    corners[i] = Dot(cells.Slopes(seed, dx, dy, dz), cells.Offset(dx, dy, dz));
+  }
+  const Lanes u = Quintic(cells.offset.x), v = Quintic(cells.offset.y), w = Quintic(cells.offset.z);
+  const Lanes low = Lerp(Lerp(corners[0], corners[1], u), Lerp(corners[2], corners[3], u), v);
+  const Lanes high = Lerp(Lerp(corners[4], corners[5], u), Lerp(corners[6], corners[7], u), v);
+  return Min(Max(Lerp(low, high, w), Broadcast(-1)), Broadcast(1));
 }
 
 // Two octaves, scaled to stay within ±1: the noise in clouds.
-template <int kLanes>
-void Clouds(uint64_t seed, float scale_mm, const float (*place)[kLanes], float* clouds) {
-  const uint32_t coarse = NoiseSeed(seed), fine = NoiseSeed(seed + 1);
-  for (int i = 0; i < kLanes; ++i) {
-    const float x = place[0][i] / scale_mm, y = place[1][i] / scale_mm, z = place[2][i] / scale_mm;
-    clouds[i] = (Noise(coarse, x, y, z) + 0.5f * Noise(fine, 2 * x, 2 * y, 2 * z)) / 1.5f;
-  }
+Lanes Clouds(uint64_t seed, float scale_mm, const Lanes3& place) {
+  const Lanes3 scaled = place * Broadcast(1 / scale_mm);
+  return (Noise(NoiseSeed(seed), scaled) + 0.5f * Noise(NoiseSeed(seed + 1), scaled * Broadcast(2))) /
+         1.5f;
 }
 
 // 1 on the middle of a vessel, 0 beyond its width. The noise field is bent by another one, so that vessels
 // wind; near its zero it changes by about one a lattice step, which turns its value into a distance.
-template <int kLanes>
-void InsideVessels(const Vessels& vessels, uint64_t seed, const float (*place)[kLanes], float* inside) {
-  const uint32_t field_seed = NoiseSeed(seed + 2), bend_seed = NoiseSeed(seed + 3);
-  const float spacing = static_cast<float>(vessels.spacing_mm);
-  const float steepness = static_cast<float>(vessels.spacing_mm / vessels.width_mm);
-  for (int i = 0; i < kLanes; ++i) {
-    const float x = place[0][i] / spacing, y = place[1][i] / spacing, z = place[2][i] / spacing;
-    const float bend = 0.35f * Noise(bend_seed, 2 * x, 2 * y, 2 * z);
-    const float distance = std::abs(Noise(field_seed, x + bend, y - bend, z + bend)) * steepness;
-    const float to_middle = Quintic(1 - distance);
-    inside[i] = distance < 1 ? to_middle : 0.0f;
-  }
-}
-
-// One source for one place and for many, so that both give the same bits.
-template <int kLanes>
-void Albedos(const Surface& surface, uint64_t seed, const float (*place)[kLanes], float (*albedo)[kLanes]) {
-  for (int c = 0; c < 3; ++c) std::fill_n(albedo[c], kLanes, static_cast<float>(surface.albedo[c]));
-  alignas(64) float texture[kLanes];
-  if (surface.mottling) {
-    const float contrast = static_cast<float>(surface.mottling->contrast);
-    Clouds<kLanes>(seed, static_cast<float>(surface.mottling->scale_mm), place, texture);
-    for (int i = 0; i < kLanes; ++i) {
-      const float factor = std::exp(contrast * texture[i]);
-      for (int c = 0; c < 3; ++c) albedo[c][i] *= factor;
-    }
-  }
-  if (surface.vessels) {
-    const Vec3f absorption = surface.vessels->absorption.cast<float>();
-    InsideVessels<kLanes>(*surface.vessels, seed, place, texture);
-    for (int i = 0; i < kLanes; ++i) {
-      if (texture[i] <= 0) continue;
-      for (int c = 0; c < 3; ++c) albedo[c][i] *= std::exp(-texture[i] * absorption[c]);
-    }
-  }
-  for (int c = 0; c < 3; ++c) {
-    for (int i = 0; i < kLanes; ++i) albedo[c][i] = std::min(albedo[c][i], 1.0f);
-  }
+Lanes InsideVessels(const Vessels& vessels, uint64_t seed, const Lanes3& place) {
+  const Lanes3 scaled = place * Broadcast(1 / static_cast<float>(vessels.spacing_mm));
+  const Lanes bend = 0.35f * Noise(NoiseSeed(seed + 3), scaled * Broadcast(2));
+  const Lanes field = Noise(NoiseSeed(seed + 2), {scaled.x + bend, scaled.y - bend, scaled.z + bend});
+  const Lanes distance = Abs(field) * static_cast<float>(vessels.spacing_mm / vessels.width_mm);
+  return distance < 1.0f ? Quintic(1.0f - distance) : Lanes{};
 }
 
 }  // namespace
@@ -131,47 +141,67 @@ Surface ReadSurface(const ConfigTable& table) {
 }
 
 float GradientNoise(uint64_t seed, const Vec3f& point) {
-  return Noise(NoiseSeed(seed), point[0], point[1], point[2]);
+  const uint32_t noise_seed = NoiseSeed(seed);
+  const Vec3f floor = point.array().floor(), f = point - floor;
+  const int x = static_cast<int>(floor[0]), y = static_cast<int>(floor[1]), z = static_cast<int>(floor[2]);
+  const auto corner = [&](int dx, int dy, int dz) {
+    return GradientDot(LatticeHash(noise_seed, x + dx, y + dy, z + dz), f[0] - static_cast<float>(dx),
+                       f[1] - static_cast<float>(dy), f[2] - static_cast<float>(dz));
+  };
+  const float u = Quintic(f[0]), v = Quintic(f[1]), w = Quintic(f[2]);
+  const float low =
+      Lerp(Lerp(corner(0, 0, 0), corner(1, 0, 0), u), Lerp(corner(0, 1, 0), corner(1, 1, 0), u), v);
+  const float high =
+      Lerp(Lerp(corner(0, 0, 1), corner(1, 0, 1), u), Lerp(corner(0, 1, 1), corner(1, 1, 1), u), v);
+  return Cut(Lerp(low, high, w));
 }
 
-Vec3f NoiseGradient(uint64_t seed, const Vec3f& point) {
+Lanes GradientNoise(uint64_t seed, const Lanes3& points) { return Noise(NoiseSeed(seed), points); }
+
+Lanes3 NoiseGradient(uint64_t seed, const Lanes3& points) {
   const uint32_t noise_seed = NoiseSeed(seed);
-  const Vec3f floor = point.array().floor(), offset = point - floor;
-  Vec3f weight, weight_slope;
-  for (int d = 0; d < 3; ++d) {
-    const float t = offset[d];
-    weight[d] = Quintic(t);
-    weight_slope[d] = 30 * t * t * (t - 1) * (t - 1);
-  }
-  Vec3f gradient = Vec3f::Zero();
-  for (int corner = 0; corner < 8; ++corner) {
-    const int at[3] = {corner & 1, corner >> 1 & 1, corner >> 2 & 1};
-    const uint32_t hash = LatticeHash(noise_seed, static_cast<int>(floor[0]) + at[0],
-                                      static_cast<int>(floor[1]) + at[1], static_cast<int>(floor[2]) + at[2]);
-    // The lattice point's gradient is that of a linear function, read off at unit steps.
-    const Vec3f slope(GradientDot(hash, 1, 0, 0), GradientDot(hash, 0, 1, 0), GradientDot(hash, 0, 0, 1));
-    const float value = slope.dot(offset - Vec3f(float(at[0]), float(at[1]), float(at[2])));
-    Vec3f share, share_slope;
-    for (int d = 0; d < 3; ++d) {
-      share[d] = at[d] ? weight[d] : 1 - weight[d];
-      share_slope[d] = at[d] ? weight_slope[d] : -weight_slope[d];
-    }
-    gradient += share.prod() * slope + value * Vec3f(share_slope[0] * share[1] * share[2],
-                                                     share[0] * share_slope[1] * share[2],
-                                                     share[0] * share[1] * share_slope[2]);
+  const Cells cells(points);
+  const Lanes3& t = cells.offset;
+  const auto slope_of_quintic = [](const Lanes& t) { return 30.0f * t * t * (t - 1.0f) * (t - 1.0f); };
+  const Lanes3 weight = {Quintic(t.x), Quintic(t.y), Quintic(t.z)};
+  const Lanes3 steepness = {slope_of_quintic(t.x), slope_of_quintic(t.y), slope_of_quintic(t.z)};
+  Lanes3 gradient{};
+  for (int i = 0; i < 8; ++i) {
+    const int dx = i & 1, dy = i >> 1 & 1, dz = i >> 2;
+    const Lanes3 slopes = cells.Slopes(noise_seed, dx, dy, dz);
+    const Lanes value = Dot(slopes, cells.Offset(dx, dy, dz));
+    const Lanes3 share = {dx ? weight.x : 1.0f - weight.x, dy ? weight.y : 1.0f - weight.y,
+                          dz ? weight.z : 1.0f - weight.z};
+    const Lanes3 growth = {dx ? steepness.x : -steepness.x, dy ? steepness.y : -steepness.y,
+                           dz ? steepness.z : -steepness.z};
+    gradient = gradient + slopes * (share.x * share.y * share.z) +
+               Lanes3{growth.x * share.y * share.z, share.x * growth.y * share.z,
+                      share.x * share.y * growth.z} * value;
   }
   return gradient;
 }
 
-Vec3f AlbedoAt(const Surface& surface, uint64_t seed, const Vec3f& place_mm) {
-  const float place[3][1] = {{place_mm[0]}, {place_mm[1]}, {place_mm[2]}};
-  float albedo[3][1];
-  Albedos<1>(surface, seed, place, albedo);
-  return {albedo[0][0], albedo[1][0], albedo[2][0]};
+Lanes3 AlbedoAt(const Surface& surface, uint64_t seed, const Lanes3& places_mm) {
+  Lanes3 albedo = Broadcast(Vec3f(surface.albedo.cast<float>()));
+  if (surface.mottling) {
+    const float contrast = static_cast<float>(surface.mottling->contrast);
+    albedo = albedo * Exp(contrast * Clouds(seed, static_cast<float>(surface.mottling->scale_mm), places_mm));
+  }
+  if (surface.vessels) {
+    const Lanes inside = InsideVessels(*surface.vessels, seed, places_mm);
+    if (Any(inside > 0.0f)) {
+      const Vec3f absorption = surface.vessels->absorption.cast<float>();
+      albedo.x *= Exp(-absorption[0] * inside);
+      albedo.y *= Exp(-absorption[1] * inside);
+      albedo.z *= Exp(-absorption[2] * inside);
+    }
+  }
+  const Lanes one = Broadcast(1);
+  return {Min(albedo.x, one), Min(albedo.y, one), Min(albedo.z, one)};
 }
 
-void AlbedoAt(const Surface& surface, uint64_t seed, const Lanes3& place_mm, Lanes3* albedo) {
-  Albedos<Lanes3::kSize>(surface, seed, place_mm.c, albedo->c);
+Vec3f AlbedoAt(const Surface& surface, uint64_t seed, const Vec3f& place_mm) {
+  return AlbedoAt(surface, seed, Broadcast(place_mm))[0];
 }
 
 TangentFrame::TangentFrame(const Vec3f& normal) {

@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "common/config.h"
+#include "common/lanes.h"
 #include "common/math.h"
 #include "common/random.h"
 #include "sim/imaging/coat.h"
@@ -39,25 +40,22 @@ Surface ReadSurface(const ConfigTable& surface);
 // Smooth noise in ±1 at a point, period-free, a function of seed (Perlin 2002: gradients at the integer
 // lattice, quintic interpolation).
 float GradientNoise(uint64_t seed, const Vec3f& point);
-// Its gradient.
-Vec3f NoiseGradient(uint64_t seed, const Vec3f& point);
 
 // The noise fields of a surface have seeds of their own: mottling the surface's seed and the next, vessels
 // the two after, then the coat's relief two.
 inline constexpr uint64_t kReliefSeeds = 4;
 
-// Three numbers in each of a packet's lanes: places or albedos.
-struct alignas(64) Lanes3 {
-  static constexpr int kSize = 16;
-  float c[3][kSize];
-};
+// The same in each lane, bit for bit.
+Lanes GradientNoise(uint64_t seed, const Lanes3& points);
+// Its gradient.
+Lanes3 NoiseGradient(uint64_t seed, const Lanes3& points);
 
-// Albedo at a place, mm from the middle of the mesh's bounds (RayScene's local coordinates, so that a mesh
-// far from the world's origin keeps its texture); each channel within [0, 1] (what a texture would lift above
-// is cut).
+// Albedo at places, mm from the middle of the resting mesh's bounds (RayScene's local coordinates, so that a
+// mesh far from the world's origin keeps its texture); each channel within [0, 1] (what a texture would lift
+// above is cut). Places that lie close together are cheapest.
+Lanes3 AlbedoAt(const Surface& surface, uint64_t seed, const Lanes3& places_mm);
+// At one place.
 Vec3f AlbedoAt(const Surface& surface, uint64_t seed, const Vec3f& place_mm);
-// The same in sixteen places at once, lane for lane the same bits.
-void AlbedoAt(const Surface& surface, uint64_t seed, const Lanes3& place_mm, Lanes3* albedo);
 
 // Two directions that with a unit normal make right-handed axes (Duff et al. 2017, "Building an orthonormal
 // basis, revisited").

@@ -1,0 +1,212 @@
+// Paths from wall to wall, sixteen at a time: what light comes from where they first end up.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+#include "common/lanes.h"
+#include "common/ray_scene.h"
+#include "sim/imaging/guide_light.h"
+#include "sim/imaging/path.h"
+#include "sim/imaging/places.h"
+#include "sim/imaging/sampler.h"
+
+namespace lumen {
+
+// Pairs of random numbers that a path uses, one of each a bounce (from 1). Chains that start at the same
+// sample for different purposes start at different pairs.
+class BouncePairs {
+ public:
+  explicit constexpr BouncePairs(uint32_t first) : first_(first) {}
+  constexpr uint32_t Direction(int bounce) const { return Of(bounce, 0); }
+  constexpr uint32_t Roulette(int bounce) const { return Of(bounce, 1); }
+  constexpr uint32_t Guide(int bounce) const { return Of(bounce, 2); }
+
+ private:
+  constexpr uint32_t Of(int bounce, uint32_t use) const {
+    return first_ + static_cast<uint32_t>(bounce - 1) * 3 + use;
+  }
+  uint32_t first_;
+};
+
+// Sixteen rays that leave the wall.
+struct BounceStart {
+  LanesI on{};
+  Lanes3 origin{}, direction{};  // unit
+  Lanes3 weight{};               // what share of the light that comes along them is seen, for the roulette
+  std::optional<Sampler> samplers[kLanes];
+};
+
+// Where they end on the wall, and the light that is sent from there.
+template <bool kCoat>
+struct FarEnds;
+
+template <>
+struct FarEnds<false> {
+  Places places;
+  Lanes3 radiance;  // to all sides
+
+  // One lane's in all lanes.
+  FarEnds Lane(int i) const {
+    FarEnds lane;
+    lane.radiance = Broadcast(radiance[i]);
+    return lane;
+  }
+  Lanes3 RadianceTo(const Lanes3&) const { return radiance; }
+};
+
+template <>
+struct FarEnds<true> {
+  CoatedPlaces places;
+  struct Arrival {
+    Lanes3 toward;  // unit, from the place
+    Lanes3 light;   // irradiance of a facing patch
+  } arrivals[2];    // from a guide; on the path, over its density
+
+  FarEnds Lane(int i) const {
+    FarEnds lane;
+    lane.places.normal = Broadcast(places.normal[i]);
+    lane.places.albedo = Broadcast(places.albedo[i]);
+    lane.places.coat_normal = Broadcast(places.coat_normal[i]);
+    lane.places.coat = places.coat;
+    for (int j = 0; j < 2; ++j) {
+      lane.arrivals[j] = Arrival{Broadcast(arrivals[j].toward[i]), Broadcast(arrivals[j].light[i])};
+    }
+    return lane;
+  }
+
+  // Towards unit directions above the wall.
+  Lanes3 RadianceTo(const Lanes3& direction) const {
+    CoatedLanes seen{places.normal, places.albedo, direction, places.coat_normal, {}};
+    seen.reflectance = places.coat->Reflectance(Dot(seen.coat_normal, direction));
+    Lanes3 radiance{};
+    for (const Arrival& arrival : arrivals) {
+      const CoatLobesLanes lobes = places.coat->Eval(seen, arrival.toward);
+      radiance = radiance + arrival.light * (lobes.base + Lanes3{lobes.glint, lobes.glint, lobes.glint});
+    }
+    return radiance;
+  }
+};
+
+template <bool kCoat>
+class BouncePaths {
+ public:
+  BouncePaths(const PathScene& scene, const PathOptions& options)
+      : wall_(*scene.wall), options_(options), finder_(scene) {}
+
+  // Where the rays end and what of the guides' light is sent from there. Rays are counted.
+  FarEnds<kCoat> End(const Eye& eye, const BounceStart& start, BouncePairs pairs, int64_t* rays) const {
+    FarEnds<kCoat> ends;
+    ends.places = Trace(start.on, start.origin, start.direction, rays);
+    const ChosenLight light = LightFromOneGuide<kCoat>(
+        wall_, eye, ends.places, Numbers(start, ends.places.alive, pairs.Guide(1)), rays);
+    if constexpr (kCoat) {
+      ends.arrivals[0] = typename FarEnds<kCoat>::Arrival{light.toward, light.irradiance};
+      ends.arrivals[1] = typename FarEnds<kCoat>::Arrival{light.toward, Lanes3{}};
+    } else {
+      ends.radiance = light.sent;
+    }
+    return ends;
+  }
+
+  // Adds the light that comes to the ends from other walls, times `share`.
+  void AddRest(const Eye& eye, const BounceStart& start, BouncePairs pairs, float share, FarEnds<kCoat>* ends,
+               int64_t* rays) const {
+    PlacesOf<kCoat> places = ends->places;
+    Lanes3 throughput = Broadcast(Vec3f(1, 1, 1)), weight = start.weight, incoming{};
+    for (int bounce = 2; bounce <= options_.bounces && Any(places.alive); ++bounce) {
+      const Lanes3 direction = NextDirections(start, pairs, bounce, &places, &throughput, &weight);
+      if constexpr (kCoat) {
+        if (bounce == 2) ends->arrivals[1].toward = direction;
+      }
+      places = Trace(places.alive, OffsetOrigin(places.point, places.normal), direction, rays);
+      const ChosenLight light = LightFromOneGuide<kCoat>(
+          wall_, eye, places, Numbers(start, places.alive, pairs.Guide(bounce)), rays);
+      incoming = incoming + Select(places.alive, throughput * light.sent, Lanes3{});
+    }
+    incoming = incoming * Broadcast(share);
+    if constexpr (kCoat) {
+      ends->arrivals[1].light = incoming;
+    } else {
+      ends->radiance = ends->radiance + ends->places.albedo * incoming;
+    }
+  }
+
+ private:
+  // Where paths go on to from places; those that the roulette ends are no longer alive. throughput: what
+  // share of the light that comes along them reaches the ends, whose own lobe is not in it; weight: of what is
+  // seen.
+  Lanes3 NextDirections(const BounceStart& start, BouncePairs pairs, int bounce, PlacesOf<kCoat>* places,
+                        Lanes3* throughput, Lanes3* weight) const {
+    Lanes3 direction{};
+    for (int i = 0; i < kLanes; ++i) {
+      if (!places->alive[i]) continue;
+      const Sampler& sampler = *start.samplers[i];
+      const Vec2f random = sampler.Pair(pairs.Direction(bounce));
+      Vec3f factor = places->albedo[i], toward;  // cosine-distributed: BRDF · cos / density is the albedo
+      float over_density = 1;
+      if constexpr (kCoat) {
+        const CoatedPlace place = places->lanes()[i];
+        // The roulette's second number is free to choose the lobe.
+        toward = places->coat->Sample(place, random, sampler.Pair(pairs.Roulette(bounce))[1]);
+        const CoatLobes lobes = places->coat->Eval(place, toward);
+        over_density = 1 / places->coat->Pdf(place, toward);
+        factor = (lobes.base + Vec3f::Constant(lobes.glint)) * over_density;
+      } else {
+        toward = lambert::Sample(places->normal[i], random);
+      }
+      Vec3f seen = (*weight)[i].cwiseProduct(factor);
+      Vec3f passed = (*throughput)[i];
+      if (bounce > 2) {
+        passed = passed.cwiseProduct(factor).eval();
+      } else if (kCoat) {
+        passed *= over_density;
+      }
+      if (bounce > options_.roulette_after) {
+        const float survival = std::min(1.0f, std::sqrt(seen.maxCoeff()));
+        if (sampler.Pair(pairs.Roulette(bounce))[0] >= survival) places->alive[i] = 0;
+        passed /= survival;
+        seen /= survival;
+      }
+      weight->Set(i, seen);
+      throughput->Set(i, passed);
+      direction.Set(i, toward);
+    }
+    return direction;
+  }
+
+  PlacesOf<kCoat> Trace(const LanesI& on, const Lanes3& origin, const Lanes3& direction, int64_t* rays) const {
+    constexpr float kFar = 1e30f;
+    RayPacket packet;
+    HitPacket hits;
+    Store3(origin, packet.origin);
+    Store3(direction, packet.direction);
+    for (int i = 0; i < kLanes; ++i) {
+      RayHit hit;
+      if (on[i]) {
+        hit = wall_.Intersect(origin[i], direction[i], 0, kFar);
+        ++*rays;
+      }
+      hits.face[i] = hit.face;
+      hits.t[i] = hit.t;
+      hits.u[i] = hit.u;
+      hits.v[i] = hit.v;
+    }
+    return finder_.Find(packet, hits, true);
+  }
+
+  static Lanes Numbers(const BounceStart& start, const LanesI& alive, uint32_t pair) {
+    Lanes numbers{};
+    for (int i = 0; i < kLanes; ++i) {
+      if (alive[i]) numbers[i] = start.samplers[i]->Pair(pair)[0];
+    }
+    return numbers;
+  }
+
+  const RayScene& wall_;
+  const PathOptions options_;
+  PlaceFinder<kCoat> finder_;
+};
+
+}  // namespace lumen

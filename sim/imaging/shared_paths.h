@@ -1,0 +1,191 @@
+// Light from wall to wall by paths that the pixels of a tile share (Bekaert, Sbert and Halton 2002, "Accelerating
+// path tracing by re-using paths"). From the n places that the tile's pixels see, K bounce paths start with the
+// density cos/π of their directions; where each first ends, y, is joined to all n places x_i. With
+// g_i(y) = V·cos·cos'/d², what path k contributes to place i is, by the balance heuristic over all the places
+// that it could have started from,
+//
+//   ρ_i · L(y_k → x_i) · g_i(y_k) / (K/n · Σ_j g_j(y_k)),
+//
+// at most n/K · ρ_i L. A join takes n shadow rays, in coherent packets, and is what costs; so of the K ends
+// only some are joined, chosen with a probability e_k in proportion to their brightness and divided by it
+// (resampled importance sampling: Talbot, Cline and Egbert 2005), and only every kRestEvery-th packet of paths
+// goes on beyond its end. All of it is without bias. Noise is smaller than with a path for each pixel, and
+// alike in neighbouring pixels.
+#pragma once
+
+#include <array>
+#include <cmath>
+#include <vector>
+
+#include "sim/imaging/bounce_paths.h"
+#include "sim/imaging/tile.h"
+
+namespace lumen {
+
+template <bool kCoat>
+class SharedPaths {
+ public:
+  SharedPaths(const PathScene& scene, const PathOptions& options)
+      : wall_(*scene.wall), count_(options.shared_paths), paths_(scene, options) {}
+
+  // A path whose light is not finite is left out.
+  struct Lost {
+    int block, lane;  // that it started from
+  };
+
+  // Adds to the indirect light of a sample. key: of the tile's random numbers; sample: of the frame. lost is
+  // called with a Lost for each path that isn't finite.
+  template <class OnLost>
+  void Add(const Eye& eye, uint64_t seed, uint64_t key, int sample, TileSample<kCoat>* tile, int64_t* rays,
+           const OnLost& lost) const {
+    const Places places(*tile);
+    if (places.count == 0) return;
+    const int packets = (count_ * kPathsPerJoin + kLanes - 1) / kLanes;
+    const Sampler tile_sampler(seed, key ^ kTileNumbers, static_cast<uint32_t>(sample));
+    const Vec2f tile_random = tile_sampler.Pair(0);
+    const int rest = static_cast<int>(tile_random[0] * kRestEvery);
+    std::vector<Packet> paths(static_cast<size_t>(packets));
+    double whole = 0;
+    for (int p = 0; p < packets; ++p) {
+      Packet& path = paths[static_cast<size_t>(p)];
+      const BounceStart start = Start(places, *tile, seed, key, sample, p, packets, path.source);
+      path.ends = paths_.End(eye, start, kPairs, rays);
+      if (p % kRestEvery == rest) {
+        const int going_on = (packets - rest + kRestEvery - 1) / kRestEvery;
+        paths_.AddRest(eye, start, kPairs, float(kRestEvery), &path.ends, rays);
+        (void)going_on;
+      }
+      path.brightness = Brightness(path.ends, start);
+      for (int i = 0; i < kLanes; ++i) {
+        if (!path.ends.places.alive[i]) path.brightness[i] = 0;
+        if (std::isfinite(path.brightness[i])) {
+          whole += path.brightness[i];
+        } else {
+          lost(Lost{path.source[i] / kLanes, path.source[i] % kLanes});
+          path.brightness[i] = 0;
+        }
+      }
+    }
+    if (!(whole > 0)) return;
+    // Systematic sampling: an end is chosen where the sum of the e_k passes an integer.
+    double passed = tile_random[1];
+    for (Packet& path : paths) {
+      for (int i = 0; i < kLanes; ++i) {
+        if (path.brightness[i] == 0) continue;
+        const double chance = std::min(1.0, count_ * path.brightness[i] / whole);
+        const double before = std::floor(passed);
+        passed += chance;
+        if (std::floor(passed) == before) continue;
+        const double share = places.count / (double(packets) * kLanes * chance);
+        Join(path.ends, i, path.source[i], static_cast<float>(share), places, tile, rays);
+      }
+    }
+  }
+
+ private:
+  static constexpr int kPathsPerJoin = 8, kRestEvery = 1;
+  static constexpr uint64_t kTileNumbers = 1ull << 38;  // apart from its paths'
+  static constexpr uint32_t kSourcePair = 0;
+  static constexpr BouncePairs kPairs{1};
+
+  struct Packet {
+    FarEnds<kCoat> ends;
+    int source[kLanes];  // place that each path starts from
+    Lanes brightness;
+  };
+
+  // What the choice of the joins goes by: of light sent back to where the path started.
+  static Lanes Brightness(const FarEnds<kCoat>& ends, const BounceStart& start) {
+    const Lanes3 light = ends.RadianceTo(start.direction * Broadcast(-1));
+    return 0.2126f * light.x + 0.7152f * light.y + 0.0722f * light.z;
+  }
+
+  // The tile's places that are alive.
+  struct Places {
+    explicit Places(const TileSample<kCoat>& tile) {
+      for (int block = 0; block < kBlocks; ++block) {
+        origin[block] = OffsetOrigin(tile.places[block].point, tile.places[block].normal);
+        for (int i = 0; i < kLanes; ++i) {
+          if (tile.places[block].alive[i]) order[count++] = static_cast<int16_t>(block * kLanes + i);
+        }
+      }
+    }
+    int count = 0;
+    std::array<int16_t, kBlocks * kLanes> order;
+    Lanes3 origin[kBlocks];
+  };
+
+  // A packet's starts. Its lanes lie a packet count apart in the order of all paths, each of which has a share
+  // of the places for its own: together their densities are those of any path from any place.
+  BounceStart Start(const Places& places, const TileSample<kCoat>& tile, uint64_t seed, uint64_t key,
+                    int sample, int packet, int packets, int source[kLanes]) const {
+    BounceStart start;
+    const int all = packets * kLanes;
+    for (int i = 0; i < kLanes; ++i) {
+      const int path = i * packets + packet;
+      const Sampler& sampler =
+          start.samplers[i].emplace(seed, key, static_cast<uint32_t>(sample * all + path));
+      const double pick = places.count * (path + double(sampler.Pair(kSourcePair)[0])) / all;
+      source[i] = places.order[std::min(static_cast<int>(pick), places.count - 1)];
+      const int block = source[i] / kLanes, lane = source[i] % kLanes;
+      const auto& from = tile.places[block];
+      start.on[i] = -1;
+      start.origin.Set(i, places.origin[block][lane]);
+      start.direction.Set(i, lambert::Sample(from.normal[lane], sampler.Pair(kPairs.Direction(1))));
+      start.weight.Set(i, from.albedo[lane]);
+    }
+    return start;
+  }
+
+  void Join(const FarEnds<kCoat>& ends, int lane, int source, float share, const Places& places,
+            TileSample<kCoat>* tile, int64_t* rays) const {
+    const Lanes3 point = Broadcast(ends.places.point[lane]), normal = Broadcast(ends.places.normal[lane]);
+    const Lanes3 from = OffsetOrigin(point, normal);
+    Lanes coupling[kBlocks], sum{};
+    for (int block = 0; block < kBlocks; ++block) {
+      const auto& seen = tile->places[block];
+      const Lanes3 to = point - seen.point;
+      const Lanes squared = Dot(to, to), near = Dot(seen.normal, to), far = -Dot(normal, to);
+      const LanesI faces = seen.alive & (near > 0.0f) & (far > 0.0f);
+      coupling[block] = Lanes{};
+      if (!Any(faces)) continue;
+      LanesI visible = ~Hidden(from, places.origin[block], faces, rays);
+      // The path itself has shown that its start is seen.
+      if (source / kLanes == block) visible[source % kLanes] = -1;
+      // A quotient at a time: the product of the squares could vanish.
+      coupling[block] = faces & visible ? (near / squared) * (far / squared) : Lanes{};
+      sum += coupling[block];
+    }
+    float total = 0;
+    for (int i = 0; i < kLanes; ++i) total += sum[i];
+    // Rounding can turn the path's own start away; then nothing is seen from where it ended.
+    if (!(total > 0)) return;
+    const FarEnds<kCoat> end = ends.Lane(lane);
+    for (int block = 0; block < kBlocks; ++block) {
+      const LanesI joined = coupling[block] > 0.0f;
+      if (!Any(joined)) continue;
+      const auto& seen = tile->places[block];
+      const Lanes3 direction = Normalized(point - seen.point);
+      Lanes3 light = end.RadianceTo(direction * Broadcast(-1));
+      if constexpr (kCoat) light = light * seen.coat->Transmission(seen.lanes(), direction);
+      tile->indirect[block] = tile->indirect[block] + Select(joined,
+                              seen.albedo * light * (coupling[block] * (share / total)), Lanes3{});
+    }
+  }
+
+  LanesI Hidden(const Lanes3& from, const Lanes3& to, const LanesI& asked, int64_t* rays) const {
+    RayPacket packet;
+    Store3(from, packet.origin);
+    Store3(to - from, packet.direction);
+    Store(Lanes{}, packet.tnear);
+    Store(asked ? Broadcast(1) : Broadcast(-1), packet.tfar);
+    for (int i = 0; i < kLanes; ++i) *rays -= asked[i];
+    return wall_.Occluded(packet);
+  }
+
+  const RayScene& wall_;
+  const int count_;
+  BouncePaths<kCoat> paths_;
+};
+
+}  // namespace lumen

@@ -1,0 +1,52 @@
+// A tile of a frame's pixels, whose samples are traced together.
+#pragma once
+
+#include <cstdint>
+
+#include "common/camera.h"
+#include "common/image.h"
+#include "common/lanes.h"
+#include "sim/imaging/guide_light.h"
+#include "sim/imaging/places.h"
+
+namespace lumen {
+
+// A tile is kBlocks blocks of kBlockEdge × kBlockEdge pixels, a block one packet of rays.
+inline constexpr int kBlockEdge = 4, kBlocksAcross = 4, kBlocks = kBlocksAcross * kBlocksAcross;
+inline constexpr int kTileEdge = kBlockEdge * kBlocksAcross;
+static_assert(kBlockEdge * kBlockEdge == kLanes);
+
+// One sample of each of a tile's pixels.
+template <bool kCoat>
+struct TileSample {
+  PlacesOf<kCoat> places[kBlocks];  // that the pixels see
+  LobesOf<kCoat> direct[kBlocks];
+  Lanes3 indirect[kBlocks];
+};
+
+// Where a tile lies. The tile may reach beyond the image.
+struct TilePixels {
+  int x0, y0;
+  LanesI on[kBlocks];  // −1: a pixel that is rendered
+
+  int X(int block, int lane) const { return x0 + block % kBlocksAcross * kBlockEdge + lane % kBlockEdge; }
+  int Y(int block, int lane) const { return y0 + block / kBlocksAcross * kBlockEdge + lane / kBlockEdge; }
+
+  // on: the pixels of `valid` that aren't 0.
+  TilePixels(int x0, int y0, const Image8& valid) : x0(x0), y0(y0) {
+    for (int block = 0; block < kBlocks; ++block) {
+      for (int i = 0; i < kLanes; ++i) {
+        const int x = X(block, i), y = Y(block, i);
+        const bool inside = x >= 0 && y >= 0 && x < valid.width && y < valid.height;
+        on[block][i] = inside && *valid.Pixel(x, y) != 0 ? -1 : 0;
+      }
+    }
+  }
+  bool Empty() const {
+    LanesI any{};
+    for (const LanesI& block : on) any |= block;
+    return !Any(any);
+  }
+};
+
+}  // namespace lumen
