@@ -41,6 +41,11 @@ inline Lanes Load(const float* from) {
   return lanes;
 }
 inline void Store(const Lanes& lanes, float* to) { std::memcpy(to, &lanes, sizeof(lanes)); }
+inline LanesI LoadI(const uint32_t* from) {
+  LanesI lanes;
+  std::memcpy(&lanes, from, sizeof(lanes));
+  return lanes;
+}
 inline Lanes3 Load3(const float (*from)[kLanes]) { return {Load(from[0]), Load(from[1]), Load(from[2])}; }
 inline void Store3(const Lanes3& lanes, float (*to)[kLanes]) {
   Store(lanes.x, to[0]);
@@ -79,6 +84,17 @@ inline bool Any(const LanesI& mask) {
   int32_t any = 0;
   for (int i = 0; i < kLanes; ++i) any |= mask[i];
   return any != 0;
+#endif
+}
+
+// How many lanes a mask holds in.
+inline int Count(const LanesI& mask) {
+#ifdef __AVX512F__
+  return __builtin_popcount(_mm512_test_epi32_mask((__m512i)mask, (__m512i)mask));
+#else
+  int32_t count = 0;
+  for (int i = 0; i < kLanes; ++i) count -= mask[i];
+  return count;
 #endif
 }
 

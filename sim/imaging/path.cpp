@@ -105,26 +105,28 @@ class Tracer {
                  PathCount* count) {
     Sums sums{};
     Eye eye = eye_;
+    SamplerLanes jitter[kBlocks];
+    for (int block = 0; block < kBlocks; ++block) jitter[block] = JitterOf(pixels, block);
     for (int sample = first_sample; sample < last_sample; ++sample) {
       if (view_.motion) {
         const double row = std::clamp((pixels.y0 + kTileEdge / 2.0) / view_.valid->height, 0.0, 1.0);
         const double time = view_.motion->Time(row, Sampler(seed_, key, sample).Pair(kTimePair)[0]);
         eye = Eye(*scene_.wall, *view_.light, view_.motion->At(time));
       }
-      TraceSample(eye, pixels, key, sample, &sums, count);
+      TraceSample(eye, pixels, jitter, key, sample, &sums, count);
     }
     Deposit(pixels, sums);
   }
 
-  void TraceSample(const Eye& eye, const TilePixels& pixels, uint64_t key, int sample, Sums* sums,
-                   PathCount* count) {
+  void TraceSample(const Eye& eye, const TilePixels& pixels, const SamplerLanes* jitter, uint64_t key,
+                   int sample, Sums* sums, PathCount* count) {
     TileSample<kCoat> tile;
     for (int block = 0; block < kBlocks; ++block) {
       tile.places[block].alive = LanesI{};
       tile.direct[block] = LobesOf<kCoat>{};
       tile.indirect[block] = Lanes3{};
       if (!Any(pixels.on[block])) continue;
-      tile.places[block] = Look(eye, pixels, block, sample, count);
+      tile.places[block] = Look(eye, pixels, block, jitter[block], sample, count);
       AddDirect(eye, tile.places[block], &tile.direct[block], count);
       if (options_.bounces == 0) continue;
       if (options_.shared_paths == 0) AddOwnPaths(eye, pixels, block, sample, &tile, count);
@@ -145,19 +147,19 @@ class Tracer {
                              static_cast<uint64_t>(pixels.X(block, lane)));
   }
 
-  // The places that a block's pixels see.
-  PlacesOf<kCoat> Look(const Eye& eye, const TilePixels& pixels, int block, int sample,
-                       PathCount* count) const {
-    Lanes x, y;
+  SamplerLanes JitterOf(const TilePixels& pixels, int block) const {
     uint64_t keys[kLanes];
-    for (int i = 0; i < kLanes; ++i) {
-      x[i] = static_cast<float>(pixels.X(block, i));
-      y[i] = static_cast<float>(pixels.Y(block, i));
-      keys[i] = PixelKey(pixels, block, i);
-    }
+    for (int i = 0; i < kLanes; ++i) keys[i] = PixelKey(pixels, block, i);
+    return SamplerLanes(seed_, keys);
+  }
+
+  // The places that a block's pixels see.
+  PlacesOf<kCoat> Look(const Eye& eye, const TilePixels& pixels, int block, const SamplerLanes& jitter,
+                       int sample, PathCount* count) const {
+    Lanes x = pixels.x[block], y = pixels.y[block];
     if (options_.samples > 1) {
       Lanes u, v;
-      SamplerLanes(seed_, keys).Pair(BroadcastU(static_cast<uint32_t>(sample)), kPixelPair, &u, &v);
+      jitter.Pair(BroadcastU(static_cast<uint32_t>(sample)), kPixelPair, &u, &v);
       x += u - 0.5f;
       y += v - 0.5f;
     }
@@ -174,10 +176,8 @@ class Tracer {
     Store(seen ? Broadcast(kFar) : Broadcast(-1), rays.tfar);
     HitPacket hits;
     scene_.wall->Intersect(rays, &hits);
-    for (int i = 0; i < kLanes; ++i) {
-      count->rays -= seen[i];
-      count->samples -= pixels.on[block][i];
-    }
+    count->rays += Count(seen);
+    count->samples += Count(pixels.on[block]);
     return finder_.Find(rays, hits, false);
   }
 
@@ -188,7 +188,7 @@ class Tracer {
       if (!guide.at_camera) {
         const LanesI asked = Sum(light.Whole()) != 0.0f;
         const LanesI shadowed = Shadowed(*scene_.wall, guide, places, asked);
-        for (int i = 0; i < kLanes; ++i) count->rays -= asked[i];
+        count->rays += Count(asked);
         light.base = Select(shadowed, Lanes3{}, light.base);
         if constexpr (kCoat) light.glint = Select(shadowed, Lanes3{}, light.glint);
       }

@@ -42,28 +42,29 @@ class PlaceFinder {
   // Directions: unit. bounced: the rays come from the wall, not from the camera.
   PlacesOf<kCoat> Find(const RayPacket& rays, const HitPacket& hits, bool bounced) const {
     PlacesOf<kCoat> places;
-    int model = -1;  // a lane that is alive
-    for (int i = kLanes - 1; i >= 0; --i) {
-      places.alive[i] = hits.face[i] != kNoFace ? -1 : 0;
-      if (places.alive[i]) model = i;
-    }
-    if (model < 0) {
-      places.point = places.normal = places.albedo = Lanes3{};
-      if constexpr (kCoat) places.coat = &*scene_.surface->coat;
-      return places;
-    }
+    places.alive = LoadI(hits.face) != static_cast<int32_t>(kNoFace);
     HitPacket known = hits;
-    for (int i = 0; i < kLanes; ++i) {
-      if (places.alive[i]) continue;
-      known.face[i] = hits.face[model];
-      known.u[i] = hits.u[model];
-      known.v[i] = hits.v[model];
+    int model = 0;  // a lane that is alive
+    if (Any(~places.alive)) {
+      while (model < kLanes && !places.alive[model]) ++model;
+      if (model == kLanes) {
+        places.point = places.normal = places.albedo = Lanes3{};
+        if constexpr (kCoat) places.coat = &*scene_.surface->coat;
+        return places;
+      }
+      for (int i = 0; i < kLanes; ++i) {
+        if (places.alive[i]) continue;
+        known.face[i] = hits.face[model];
+        known.u[i] = hits.u[model];
+        known.v[i] = hits.v[model];
+      }
     }
     const Lanes3 direction = Load3(rays.direction);
     const Lanes3 point = Load3(rays.origin) + direction * Load(hits.t);
     places.point = Select(places.alive, point, Broadcast(point[model]));
-    Lanes3 normal;
-    for (int i = 0; i < kLanes; ++i) normal.Set(i, scene_.wall->face_normals()[known.face[i]]);
+    const float* const normals = scene_.wall->face_normals().front().data();
+    const LanesI first = LoadI(known.face) * 3;
+    const Lanes3 normal = {Gather(normals, first), Gather(normals, first + 1), Gather(normals, first + 2)};
     const LanesI turned = Dot(normal, direction) > 0.0f;
     places.normal = Select(turned, normal * Broadcast(-1), normal);
     const Lanes3 resting = scene_.rest ? RestingPoints(known) : places.point;

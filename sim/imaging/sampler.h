@@ -80,6 +80,7 @@ class Sampler {
 // Sixteen samplers at once, lane for lane the same numbers.
 class SamplerLanes {
  public:
+  SamplerLanes() = default;
   // pixels: the second argument of each lane's Sampler.
   SamplerLanes(uint64_t seed, const uint64_t pixels[kLanes]) {
     for (int i = 0; i < kLanes; ++i) (i < kLanes / 2 ? low_ : high_)[i % (kLanes / 2)] = pixels[i];

@@ -50,11 +50,7 @@ class SharedPaths {
       Packet& path = paths[static_cast<size_t>(p)];
       const BounceStart start = Start(places, *tile, seed, key, sample, p, packets, path.source);
       path.ends = paths_.End(eye, start, kPairs, rays);
-      if (p % kRestEvery == rest) {
-        const int going_on = (packets - rest + kRestEvery - 1) / kRestEvery;
-        paths_.AddRest(eye, start, kPairs, float(kRestEvery), &path.ends, rays);
-        (void)going_on;
-      }
+      if (p % kRestEvery == rest) paths_.AddRest(eye, start, kPairs, float(kRestEvery), &path.ends, rays);
       path.brightness = Brightness(path.ends, start);
       for (int i = 0; i < kLanes; ++i) {
         if (!path.ends.places.alive[i]) path.brightness[i] = 0;
@@ -179,7 +175,7 @@ class SharedPaths {
     Store3(to - from, packet.direction);
     Store(Lanes{}, packet.tnear);
     Store(asked ? Broadcast(1) : Broadcast(-1), packet.tfar);
-    for (int i = 0; i < kLanes; ++i) *rays -= asked[i];
+    *rays += Count(asked);
     return wall_.Occluded(packet);
   }
 

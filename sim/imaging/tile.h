@@ -27,7 +27,8 @@ struct TileSample {
 // Where a tile lies. The tile may reach beyond the image.
 struct TilePixels {
   int x0, y0;
-  LanesI on[kBlocks];  // −1: a pixel that is rendered
+  LanesI on[kBlocks];       // −1: a pixel that is rendered
+  Lanes x[kBlocks], y[kBlocks];  // of the pixels' centres
 
   int X(int block, int lane) const { return x0 + block % kBlocksAcross * kBlockEdge + lane % kBlockEdge; }
   int Y(int block, int lane) const { return y0 + block / kBlocksAcross * kBlockEdge + lane / kBlockEdge; }
@@ -36,9 +37,11 @@ struct TilePixels {
   TilePixels(int x0, int y0, const Image8& valid) : x0(x0), y0(y0) {
     for (int block = 0; block < kBlocks; ++block) {
       for (int i = 0; i < kLanes; ++i) {
-        const int x = X(block, i), y = Y(block, i);
-        const bool inside = x >= 0 && y >= 0 && x < valid.width && y < valid.height;
-        on[block][i] = inside && *valid.Pixel(x, y) != 0 ? -1 : 0;
+        const int column = X(block, i), row = Y(block, i);
+        const bool inside = column >= 0 && row >= 0 && column < valid.width && row < valid.height;
+        on[block][i] = inside && *valid.Pixel(column, row) != 0 ? -1 : 0;
+        x[block][i] = static_cast<float>(column);
+        y[block][i] = static_cast<float>(row);
       }
     }
   }
