@@ -163,9 +163,8 @@ std::optional<Vec3<T>> Camera<T>::Unproject(const Vec2<T>& pixel) const {
 }
 
 template <class T>
-LanesI Camera<T>::Unproject(const Lanes& x, const Lanes& y, Lanes3* direction) const
-  requires std::same_as<T, float>
-{
+LanesI Camera<T>::Unproject(const Lanes& x, const Lanes& y,
+                            Lanes3* direction) const requires std::same_as<T, float> {
   if (intrinsics_.model == CameraModel::kKannalaBrandt) {  // solves for the angle, pixel by pixel
     LanesI seen{};
     for (int i = 0; i < kLanes; ++i) {

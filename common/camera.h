@@ -48,10 +48,9 @@ class Camera {
   // the model's polynomial, or not a number. Pixels outside the image are answered by the model all the same.
   std::optional<Vec3<T>> Unproject(const Vec2<T>& pixel) const;
 
-  // The same for sixteen pixels at once, to rounding. Returns −1 in the lanes whose pixel has a ray; the others'
-  // direction is +z.
-  LanesI Unproject(const Lanes& x, const Lanes& y, Lanes3* direction) const
-    requires std::same_as<T, float>;
+  // The same for sixteen pixels at once, to rounding. Returns −1 in the lanes whose pixel has a ray; the
+  // others' direction is +z.
+  LanesI Unproject(const Lanes& x, const Lanes& y, Lanes3* direction) const requires std::same_as<T, float>;
 
   // Pixel that sees a point in camera axes (any length, mm or unit). Nothing where none does: the origin,
   // behind a pinhole, beyond the fold, straight behind a fisheye. The pixel may lie outside the image.

@@ -317,10 +317,9 @@ TEST(Coat, LanesAndGlintsAreTheLobes) {
         const CoatLobes sampled = coat.Eval(places[lane], glint.incoming);
         const Vec3f half = (glint.incoming + places.outgoing[lane]).normalized();
         const Vec3f& s = places.coat_normal[lane];
-        const float density =
-            ggx::ReflectedPdf(coat.alpha(),
-                              ggx::Distribution(coat.alpha(), half.dot(s), half.cross(s).squaredNorm()),
-                              places.outgoing[lane].dot(s));
+        const float density = ggx::ReflectedPdf(
+            coat.alpha(), ggx::Distribution(coat.alpha(), half.dot(s), half.cross(s).squaredNorm()),
+            places.outgoing[lane].dot(s));
         EXPECT_NEAR(sampled.glint / density, glint.weight, 2e-3f * glint.weight);
         ++glints;
       }

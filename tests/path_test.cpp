@@ -279,13 +279,14 @@ Estimate MeanIndirect(const Stage& stage, int seeds) {
 // In a closed Lambertian sphere what comes back from the wall falls evenly on all of it, wherever the light
 // is: of n bounces Φ/(4πR²) · (ρ + ρ² + … + ρⁿ).
 void ExpectIntegratingSphere(const Light& light, const Vec3d& position, double albedo, int bounces,
-                             int roulette_after) {
+                             int roulette_after, int shared_paths) {
   const double radius = 20;
   Stage stage(Sphere(radius, 90), Pinhole(16, 12, 8), light);
   stage.surface.albedo = Vec3d::Constant(albedo);
   stage.world_from_camera =
       Eigen::Translation3d(position) * Eigen::AngleAxisd(0.4, Vec3d(1, 2, 0.5).normalized());
-  stage.options = {8, bounces, roulette_after};
+  // All pixels share a tile.
+  stage.options = {shared_paths == 0 ? 8 : 512 / shared_paths, bounces, roulette_after, shared_paths};
   Vec3d power = Vec3d::Zero();
   for (const LightSource& source : light.sources) power += Power(source);
   const double series = albedo * (1 - std::pow(albedo, bounces)) / (1 - albedo);
@@ -302,12 +303,16 @@ TEST(Path, IntegratingSphere) {
   Light guides = OneGuide({3.2, 0.5, 0}, 2.77, 300);
   guides.sources.push_back({{-2.8, 2.7, 0}, Vec3d(-0.2, 0.1, 1).normalized(), 1.5, {100, 200, 300}});
   guides.sources.push_back({{-1.3, -3.1, 0}, Vec3d::UnitZ(), 0, {30, 20, 10}});
-  ExpectIntegratingSphere(OneGuide(), {0, 0, 0}, 0.5, 1, 9);
-  ExpectIntegratingSphere(OneGuide(), {0, 0, 0}, 0.5, 20, 20);
-  ExpectIntegratingSphere(OneGuide(), {0, 0, 0}, 0.5, 20, 0);
-  ExpectIntegratingSphere(guides, {4, -6, 3}, 0.5, 20, 20);
-  ExpectIntegratingSphere(guides, {4, -6, 3}, 0.5, 20, 2);
-  ExpectIntegratingSphere(guides, {4, -6, 3}, 0.9, 40, 3);
+  // Each pixel's own paths; few and many that a tile shares.
+  ExpectIntegratingSphere(OneGuide(), {0, 0, 0}, 0.5, 20, 20, 3);
+  for (const int shared_paths : {0, 32}) {
+    ExpectIntegratingSphere(OneGuide(), {0, 0, 0}, 0.5, 1, 9, shared_paths);
+    ExpectIntegratingSphere(OneGuide(), {0, 0, 0}, 0.5, 20, 20, shared_paths);
+    ExpectIntegratingSphere(OneGuide(), {0, 0, 0}, 0.5, 20, 0, shared_paths);
+    ExpectIntegratingSphere(guides, {4, -6, 3}, 0.5, 20, 20, shared_paths);
+    ExpectIntegratingSphere(guides, {4, -6, 3}, 0.5, 20, 2, shared_paths);
+    ExpectIntegratingSphere(guides, {4, -6, 3}, 0.9, 40, 3, shared_paths);
+  }
 }
 
 // Light adds up: what several guides send by way of the wall is the sum of what each of them sends, though a
@@ -334,6 +339,51 @@ TEST(Path, OneGuideAVertexStandsForAll) {
     EXPECT_NEAR(together.mean[c], sum[c], interval);
     EXPECT_LT(interval, smallest[c]);  // leaving one out would be noticed
   }
+}
+
+// In a sphere every place couples to every other alike; beside a plate, before a far wall and across its
+// edges it doesn't. Pixel by pixel, the shared paths' mean over seeds against that of the pixels' own, in
+// units of their standard errors.
+TEST(Path, SharedPathsAgreeWithOwnOnesInEveryPixel) {
+  Mesh mesh = Sphere(20, 30);
+  AddPlate(&mesh, 2, 9, -6, 6, 4);
+  AddPlate(&mesh, -9, -1, -3, 8, 2);
+  Stage stage(mesh, Pinhole(37, 29, 12), OneGuide({3.2, 0.5, 0}, 2.77, 300));
+  stage.world_from_camera.translation() = Vec3d(0, 0, -9);
+  stage.surface.mottling.emplace();
+  const auto means = [&](int shared_paths, int samples, ImageF* variance) {
+    stage.options = {samples, 3, 1, shared_paths};
+    constexpr int kSeeds = 12;
+    ImageF mean(37, 29, 3);
+    *variance = mean;
+    std::vector<ImageF> renders;
+    for (int seed = 0; seed < kSeeds; ++seed) renders.push_back(stage.Render(40 + seed, true).indirect);
+    for (size_t i = 0; i < mean.data.size(); ++i) {
+      double sum = 0, squares = 0;
+      for (const ImageF& render : renders) sum += render.data[i];
+      for (const ImageF& render : renders) squares += std::pow(render.data[i] - sum / kSeeds, 2);
+      mean.data[i] = static_cast<float>(sum / kSeeds);
+      variance->data[i] = static_cast<float>(squares / (kSeeds * (kSeeds - 1.0)));
+    }
+    return mean;
+  };
+  ImageF own_variance, shared_variance;
+  const ImageF own = means(0, 128, &own_variance), shared = means(16, 32, &shared_variance);
+  double squares = 0, bias = 0, brightness = 0, spread = 0;
+  for (size_t i = 0; i < own.data.size(); ++i) {
+    const double variance = own_variance.data[i] + shared_variance.data[i];
+    const double difference = shared.data[i] - own.data[i];
+    squares += difference * difference / variance / own.data.size();
+    EXPECT_LT(std::abs(difference), 9 * std::sqrt(variance)) << i / 3 % 37 << ' ' << i / 3 / 37;
+    bias += difference / own.data.size();
+    brightness += own.data[i] / own.data.size();
+    spread += own_variance.data[i] / (double(own.data.size()) * own.data.size());
+  }
+  // Squares of Student's t with 11 degrees of freedom each side have the mean 11/9, here of 3,219 values that
+  // are not all independent.
+  EXPECT_NEAR(squares, 11.0 / 9, 0.25);
+  EXPECT_LT(std::abs(bias), 0.01 * brightness);
+  EXPECT_LT(std::sqrt(spread), 0.01 * brightness);
 }
 
 TEST(Path, PartsAddUp) {

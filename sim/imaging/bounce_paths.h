@@ -135,8 +135,8 @@ class BouncePaths {
 
  private:
   // Where paths go on to from places; those that the roulette ends are no longer alive. throughput: what
-  // share of the light that comes along them reaches the ends, whose own lobe is not in it; weight: of what is
-  // seen.
+  // share of the light that comes along them reaches the ends, whose own lobe is not in it; weight: of what
+  // is seen.
   Lanes3 NextDirections(const BounceStart& start, BouncePairs pairs, int bounce, PlacesOf<kCoat>* places,
                         Lanes3* throughput, Lanes3* weight) const {
     Lanes3 direction{};
@@ -176,7 +176,8 @@ class BouncePaths {
     return direction;
   }
 
-  PlacesOf<kCoat> Trace(const LanesI& on, const Lanes3& origin, const Lanes3& direction, int64_t* rays) const {
+  PlacesOf<kCoat> Trace(const LanesI& on, const Lanes3& origin, const Lanes3& direction,
+                        int64_t* rays) const {
     constexpr float kFar = 1e30f;
     RayPacket packet;
     HitPacket hits;

@@ -126,8 +126,8 @@ class Coat {
   float Pdf(const CoatedPlace& place, const Vec3f& incoming) const;
   // choice: in [0, 1), picks the lobe. The direction may be below the wall, where Eval is 0.
   Vec3f Sample(const CoatedPlace& place, const Vec2f& random, float choice) const;
-  // A direction for the first lobe alone, and what that lobe sends on over the direction's density: at most 1.
-  // No direction (weight 0) where it is below the wall or there is no glint.
+  // A direction for the first lobe alone, and what that lobe sends on over the direction's density: at
+  // most 1. No direction (weight 0) where it is below the wall or there is no glint.
   struct Glint {
     Vec3f incoming;
     float weight;

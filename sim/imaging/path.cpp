@@ -26,9 +26,6 @@ enum : uint32_t {
   kTimePair = 0xffffffffu
 };
 
-// What is wanted of a pixel, each RGB.
-enum Part { kDirect, kIndirect, kGlint, kParts };
-
 void Note(const Failure& failure, Failure* total) {
   if (failure.count == 0) return;
   const int64_t count = total->count + failure.count;
@@ -53,25 +50,28 @@ class Tracer {
         shared_paths_(scene, options),
         eye_(*scene.wall, *view.light, view.world_from_camera) {}
 
-  // Light from wall to wall takes a pass over the frame for each sample, on a grid of tiles shifted at random,
-  // so that what a tile's pixels have in common leaves no edges.
+  // Direct light first; light from wall to wall takes a pass over the frame for each sample, on a grid of
+  // tiles shifted at random, so that what a tile's pixels have in common leaves no edges. It looks again
+  // where the direct light looked, which costs little beside it.
   PathCount Run(bool with_parts, Film* film) {
     const int width = view_.valid->width, height = view_.valid->height;
     film->radiance = ImageF(width, height, 3);
     if (with_parts) film->direct = film->indirect = film->radiance;
     if (with_parts && kCoat) film->glint = film->radiance;
-    film_ = film;
     PathCount total;
-    if (options_.bounces == 0) {
-      RunPass(0, 0, 0, options_.samples, &total);
-    } else {
-      for (int sample = 0; sample < options_.samples; ++sample) {
-        const uint64_t shift = RandomBits(seed_, frame_, kShiftKey, static_cast<uint64_t>(sample));
-        RunPass(static_cast<int>(shift % kTileEdge), static_cast<int>(shift / kTileEdge % kTileEdge), sample,
-                sample + 1, &total);
-      }
+    ForEachTile(0, 0, &total, [&](const TilePixels& pixels, uint64_t, PathCount* count) {
+      TraceDirect(pixels, film, count);
+    });
+    if (options_.bounces == 0) return total;
+    indirect_.resize(film->radiance.data.size());
+    for (int sample = 0; sample < options_.samples; ++sample) {
+      const uint64_t shift = RandomBits(seed_, frame_, kShiftKey, static_cast<uint64_t>(sample));
+      ForEachTile(static_cast<int>(shift % kTileEdge), static_cast<int>(shift / kTileEdge % kTileEdge),
+                  &total, [&](const TilePixels& pixels, uint64_t key, PathCount* count) {
+                    TraceIndirect(pixels, key, sample, count);
+                  });
     }
-    TakeMeans();
+    AddIndirect(film);
     return total;
   }
 
@@ -79,7 +79,9 @@ class Tracer {
   static constexpr uint64_t kShiftKey = 1ull << 63;  // no pixel's
   static constexpr uint64_t kTileKey = 1ull << 39;   // with a tile's number, no pixel's
 
-  void RunPass(int shift_x, int shift_y, int first_sample, int last_sample, PathCount* total) {
+  // trace(pixels, key, count) for each tile that holds pixels to render; key: of the tile's random numbers.
+  template <class Trace>
+  void ForEachTile(int shift_x, int shift_y, PathCount* total, const Trace& trace) const {
     const int columns = (view_.valid->width + shift_x + kTileEdge - 1) / kTileEdge;
     const int rows = (view_.valid->height + shift_y + kTileEdge - 1) / kTileEdge;
     std::vector<PathCount> counts(static_cast<size_t>(rows));
@@ -89,7 +91,7 @@ class Tracer {
                                 *view_.valid);
         if (pixels.Empty()) continue;
         const uint64_t key = (frame_ << 40) ^ kTileKey ^ static_cast<uint64_t>(row * columns + column);
-        TraceTile(pixels, key, first_sample, last_sample, &counts[row]);
+        trace(pixels, key, &counts[row]);
       }
     });
     for (const PathCount& count : counts) {
@@ -99,47 +101,123 @@ class Tracer {
     }
   }
 
-  using Sums = double[kBlocks][kParts][3][kLanes];
-
-  void TraceTile(const TilePixels& pixels, uint64_t key, int first_sample, int last_sample,
-                 PathCount* count) {
-    Sums sums{};
-    Eye eye = eye_;
-    SamplerLanes jitter[kBlocks];
-    for (int block = 0; block < kBlocks; ++block) jitter[block] = JitterOf(pixels, block);
-    for (int sample = first_sample; sample < last_sample; ++sample) {
-      if (view_.motion) {
-        const double row = std::clamp((pixels.y0 + kTileEdge / 2.0) / view_.valid->height, 0.0, 1.0);
-        const double time = view_.motion->Time(row, Sampler(seed_, key, sample).Pair(kTimePair)[0]);
-        eye = Eye(*scene_.wall, *view_.light, view_.motion->At(time));
+  void TraceDirect(const TilePixels& pixels, Film* film, PathCount* count) const {
+    for (int block = 0; block < kBlocks; ++block) {
+      if (!Any(pixels.on[block])) continue;
+      const SamplerLanes jitter = JitterOf(pixels, block);
+      double sums[kCoat ? 2 : 1][3][kLanes] = {};  // by lobe
+      int lost[kLanes] = {};
+      for (int sample = 0; sample < options_.samples; ++sample) {
+        LobesOf<kCoat> light{};
+        if (view_.motion) {
+          const Eye eye = EyeOf(pixels, block, sample);
+          AddDirect(eye, Look(eye, pixels, block, jitter, sample, count), &light, count);
+        } else {
+          AddDirect(eye_, Look(eye_, pixels, block, jitter, sample, count), &light, count);
+        }
+        const LanesI finite = IsFinite(Sum(light.Whole()));
+        if (Any(pixels.on[block] & ~finite)) {
+          for (int i = 0; i < kLanes; ++i) {
+            if (!pixels.on[block][i] || finite[i]) continue;
+            Note({1, pixels.X(block, i), pixels.Y(block, i), sample}, &count->failure);
+            ++lost[i];
+          }
+        }
+        Accumulate(Select(finite, light.base, Lanes3{}), sums[0]);
+        if constexpr (kCoat) Accumulate(Select(finite, light.glint, Lanes3{}), sums[1]);
       }
-      TraceSample(eye, pixels, jitter, key, sample, &sums, count);
+      count->samples += int64_t{options_.samples} * Count(pixels.on[block]);
+      for (int i = 0; i < kLanes; ++i) {
+        if (!pixels.on[block][i] || lost[i] == options_.samples) continue;
+        const double share = 1.0 / (options_.samples - lost[i]);
+        const int x = pixels.X(block, i), y = pixels.Y(block, i);
+        for (int c = 0; c < 3; ++c) {
+          const double base = share * sums[0][c][i], glint = kCoat ? share * sums[kCoat][c][i] : 0;
+          film->radiance.Pixel(x, y)[c] = static_cast<float>(base + glint);
+          if (!film->direct.empty()) film->direct.Pixel(x, y)[c] = static_cast<float>(base);
+          if (!film->glint.empty()) film->glint.Pixel(x, y)[c] = static_cast<float>(glint);
+        }
+      }
     }
-    Deposit(pixels, sums);
   }
 
-  void TraceSample(const Eye& eye, const TilePixels& pixels, const SamplerLanes* jitter, uint64_t key,
-                   int sample, Sums* sums, PathCount* count) {
+  static void Accumulate(const Lanes3& light, double (*sums)[kLanes]) {
+    alignas(64) float values[3][kLanes];
+    Store3(light, values);
+    for (int c = 0; c < 3; ++c) {
+      for (int i = 0; i < kLanes; ++i) sums[c][i] += values[c][i];
+    }
+  }
+
+  void TraceIndirect(const TilePixels& pixels, uint64_t key, int sample, PathCount* count) {
     TileSample<kCoat> tile;
     for (int block = 0; block < kBlocks; ++block) {
       tile.places[block].alive = LanesI{};
-      tile.direct[block] = LobesOf<kCoat>{};
       tile.indirect[block] = Lanes3{};
       if (!Any(pixels.on[block])) continue;
-      tile.places[block] = Look(eye, pixels, block, jitter[block], sample, count);
-      AddDirect(eye, tile.places[block], &tile.direct[block], count);
-      if (options_.bounces == 0) continue;
-      if (options_.shared_paths == 0) AddOwnPaths(eye, pixels, block, sample, &tile, count);
-      if constexpr (kCoat) AddGlintPaths(eye, pixels, block, sample, &tile, count);
+      if (view_.motion) {
+        TraceIndirectBlock(EyeOf(pixels, block, sample), pixels, block, sample, &tile, count);
+      } else {
+        TraceIndirectBlock(eye_, pixels, block, sample, &tile, count);
+      }
     }
-    if (options_.bounces > 0 && options_.shared_paths > 0) {
-      shared_paths_.Add(eye, seed_, key, sample, &tile, &count->rays, [&](const auto& lost) {
-        Note({1, pixels.X(lost.block, lost.lane), pixels.Y(lost.block, lost.lane), sample}, &count->failure);
-      });
+    if (options_.shared_paths > 0) {
+      const auto lost = [&](const auto& path) {
+        Note({1, pixels.X(path.block, path.lane), pixels.Y(path.block, path.lane), sample}, &count->failure);
+      };
+      shared_paths_.Add(view_.motion ? EyeAt(pixels.y0 + kTileEdge / 2, key, sample) : eye_, seed_, key,
+                        sample, &tile, &count->rays, lost);
     }
-    for (int block = 0; block < kBlocks; ++block) {
-      if (Any(pixels.on[block])) Collect(pixels, block, sample, tile, (*sums)[block], count);
+    for (int block = 0; block < kBlocks; ++block) Deposit(pixels, block, sample, tile.indirect[block], count);
+  }
+
+  void TraceIndirectBlock(const Eye& eye, const TilePixels& pixels, int block, int sample,
+                          TileSample<kCoat>* tile, PathCount* count) const {
+    tile->places[block] = Look(eye, pixels, block, JitterOf(pixels, block), sample, count);
+    if (options_.shared_paths == 0) AddOwnPaths(eye, pixels, block, sample, tile, count);
+    if constexpr (kCoat) AddGlintPaths(eye, pixels, block, sample, tile, count);
+  }
+
+  // Adds a block's sample of indirect light to the frame's sums, but for pixels where it is not finite.
+  void Deposit(const TilePixels& pixels, int block, int sample, const Lanes3& light, PathCount* count) {
+    for (int i = 0; i < kLanes; ++i) {
+      if (!pixels.on[block][i]) continue;
+      const int x = pixels.X(block, i), y = pixels.Y(block, i);
+      const size_t pixel = static_cast<size_t>(y) * view_.valid->width + x;
+      const Vec3f value = light[i];
+      if (value.allFinite()) {
+        for (int c = 0; c < 3; ++c) indirect_[3 * pixel + c] += value[c];
+        continue;
+      }
+      Note({1, x, y, sample}, &count->failure);
+      std::call_once(any_lost_, [&] { lost_.assign(indirect_.size() / 3, 0); });
+      ++lost_[pixel];
     }
+  }
+
+  void AddIndirect(Film* film) const {
+    ParallelFor(0, view_.valid->height, [&](int64_t y) {
+      for (int x = 0; x < view_.valid->width; ++x) {
+        const size_t pixel = static_cast<size_t>(y) * view_.valid->width + x;
+        const int64_t kept = int64_t{options_.samples} - (lost_.empty() ? 0 : lost_[pixel]);
+        if (kept == 0) continue;
+        for (int c = 0; c < 3; ++c) {
+          const float mean = static_cast<float>(indirect_[3 * pixel + c] / static_cast<double>(kept));
+          film->radiance.data[3 * pixel + c] += mean;
+          if (!film->indirect.empty()) film->indirect.data[3 * pixel + c] = mean;
+        }
+      }
+    });
+  }
+
+  // The endoscope when some rows, whose middle is given, are read out for a sample.
+  Eye EyeAt(double row, uint64_t key, int sample) const {
+    const double height = std::clamp(row / view_.valid->height, 0.0, 1.0);
+    const double random = Sampler(seed_, key, static_cast<uint32_t>(sample)).Pair(kTimePair)[0];
+    return Eye(*scene_.wall, *view_.light, view_.motion->At(view_.motion->Time(height, random)));
+  }
+  Eye EyeOf(const TilePixels& pixels, int block, int sample) const {
+    return EyeAt(pixels.Y(block, 0) + kBlockEdge / 2, PixelKey(pixels, block, 0), sample);
   }
 
   uint64_t PixelKey(const TilePixels& pixels, int block, int lane) const {
@@ -177,7 +255,6 @@ class Tracer {
     HitPacket hits;
     scene_.wall->Intersect(rays, &hits);
     count->rays += Count(seen);
-    count->samples += Count(pixels.on[block]);
     return finder_.Find(rays, hits, false);
   }
 
@@ -245,73 +322,6 @@ class Tracer {
     tile->indirect[block] = tile->indirect[block] + Select(ends.places.alive, light, Lanes3{});
   }
 
-  // Adds a block's samples to its sums, but for those that are not finite.
-  void Collect(const TilePixels& pixels, int block, int sample, const TileSample<kCoat>& tile,
-               double (*sums)[3][kLanes], PathCount* count) {
-    Lanes3 parts[kParts] = {tile.direct[block].base, tile.indirect[block], {}};
-    if constexpr (kCoat) parts[kGlint] = tile.direct[block].glint;
-    const LanesI finite = IsFinite(Sum(parts[kDirect] + parts[kIndirect] + parts[kGlint]));
-    const LanesI lost = pixels.on[block] & ~finite;
-    if (Any(lost)) {
-      for (int i = 0; i < kLanes; ++i) {
-        if (lost[i]) NoteLost(pixels.X(block, i), pixels.Y(block, i), sample, count);
-      }
-    }
-    for (int part = 0; part < (kCoat ? kParts : kGlint); ++part) {
-      const Lanes3 kept = Select(finite, parts[part], Lanes3{});
-      alignas(64) float values[3][kLanes];
-      Store3(kept, values);
-      for (int c = 0; c < 3; ++c) {
-        for (int i = 0; i < kLanes; ++i) sums[part][c][i] += values[c][i];
-      }
-    }
-  }
-
-  void NoteLost(int x, int y, int sample, PathCount* count) {
-    Note({1, x, y, sample}, &count->failure);
-    std::call_once(any_lost_, [&] {
-      lost_.assign(static_cast<size_t>(view_.valid->width) * view_.valid->height, 0);
-    });
-    ++lost_[static_cast<size_t>(y) * view_.valid->width + x];
-  }
-
-  void Deposit(const TilePixels& pixels, const Sums& sums) {
-    ImageF* const images[kParts] = {&film_->direct, &film_->indirect, &film_->glint};
-    for (int block = 0; block < kBlocks; ++block) {
-      for (int i = 0; i < kLanes; ++i) {
-        if (!pixels.on[block][i]) continue;
-        const int x = pixels.X(block, i), y = pixels.Y(block, i);
-        for (int c = 0; c < 3; ++c) {
-          double whole = 0;
-          for (int part = 0; part < kParts; ++part) {
-            const double sum = sums[block][part][c][i];
-            whole += sum;
-            if (!images[part]->empty()) images[part]->Pixel(x, y)[c] += static_cast<float>(sum);
-          }
-          film_->radiance.Pixel(x, y)[c] += static_cast<float>(whole);
-        }
-      }
-    }
-  }
-
-  // From sums over samples to their means.
-  void TakeMeans() {
-    const int width = view_.valid->width;
-    ParallelFor(0, view_.valid->height, [&](int64_t y) {
-      for (int x = 0; x < width; ++x) {
-        const uint32_t lost = lost_.empty() ? 0 : lost_[static_cast<size_t>(y) * width + x];
-        const int64_t kept = int64_t{options_.samples} - lost;
-        if (kept == 0) continue;
-        const double share = 1.0 / static_cast<double>(kept);
-        for (ImageF* image : {&film_->radiance, &film_->direct, &film_->indirect, &film_->glint}) {
-          if (image->empty()) continue;
-          float* pixel = image->Pixel(x, static_cast<int>(y));
-          for (int c = 0; c < 3; ++c) pixel[c] = static_cast<float>(pixel[c] * share);
-        }
-      }
-    });
-  }
-
   const PathScene scene_;
   const View view_;
   const PathOptions options_;
@@ -319,10 +329,10 @@ class Tracer {
   const PlaceFinder<kCoat> finder_;
   const BouncePaths<kCoat> own_paths_;
   const SharedPaths<kCoat> shared_paths_;
-  const Eye eye_;  // at the frame's moment
-  Film* film_ = nullptr;
+  const Eye eye_;                 // at the frame's moment
+  std::vector<double> indirect_;  // sums over samples, RGB of each pixel
   std::once_flag any_lost_;
-  std::vector<uint32_t> lost_;  // samples a pixel that were not finite; empty while there are none
+  std::vector<uint32_t> lost_;  // samples of a pixel that were not finite; empty while there are none
 };
 
 }  // namespace

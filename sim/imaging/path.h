@@ -28,7 +28,7 @@ struct PathScene {
   const Surface* surface;
   uint64_t surface_seed;
   const std::vector<Vec3d>* vertex_normals = nullptr;  // VertexNormals of the wall, for a surface with a coat
-  const Mesh* rest = nullptr;  // the wall at rest, which carries the texture; none: the wall itself
+  const Mesh* rest = nullptr;         // the wall at rest, which carries the texture; none: the wall itself
   Vec3d rest_anchor = Vec3d::Zero();  // RayScene::anchor of the wall at rest
 };
 

@@ -15,8 +15,8 @@ namespace lumen {
 // In the lanes that are not alive, values are those of a lane that is, so that they cost no extra cell of a
 // texture; if none is, they are 0.
 struct Places {
-  LanesI alive;  // −1: a ray came to the wall
-  Lanes3 point;  // RayScene's local coordinates
+  LanesI alive;   // −1: a ray came to the wall
+  Lanes3 point;   // RayScene's local coordinates
   Lanes3 normal;  // unit, to the side that the ray came from; 0 for a face without area
   Lanes3 albedo;
 };
@@ -99,7 +99,8 @@ class PlaceFinder {
     for (int i = 0; i < kLanes; ++i) {
       const Vec3i& corners = faces[hits.face[i]];
       const double u = hits.u[i], v = hits.v[i];
-      const Vec3d mean = (1 - u - v) * normals[corners[0]] + u * normals[corners[1]] + v * normals[corners[2]];
+      const Vec3d mean =
+          (1 - u - v) * normals[corners[0]] + u * normals[corners[1]] + v * normals[corners[2]];
       smooth.Set(i, mean.cast<float>());
     }
     const Lanes squared = Dot(smooth, smooth);

@@ -1,16 +1,16 @@
-// Light from wall to wall by paths that the pixels of a tile share (Bekaert, Sbert and Halton 2002, "Accelerating
-// path tracing by re-using paths"). From the n places that the tile's pixels see, K bounce paths start with the
-// density cos/π of their directions; where each first ends, y, is joined to all n places x_i. With
-// g_i(y) = V·cos·cos'/d², what path k contributes to place i is, by the balance heuristic over all the places
-// that it could have started from,
+// Light from wall to wall by paths that the pixels of a tile share (Bekaert, Sbert and Halton 2002,
+// "Accelerating path tracing by re-using paths"). From the n places that the tile's pixels see, K bounce
+// paths start with the density cos/π of their directions; where each first ends, y, is joined to all n places
+// x_i. With g_i(y) = V·cos·cos'/d², what path k contributes to place i is, by the balance heuristic over all
+// the places that it could have started from,
 //
 //   ρ_i · L(y_k → x_i) · g_i(y_k) / (K/n · Σ_j g_j(y_k)),
 //
 // at most n/K · ρ_i L. A join takes n shadow rays, in coherent packets, and is what costs; so of the K ends
 // only some are joined, chosen with a probability e_k in proportion to their brightness and divided by it
-// (resampled importance sampling: Talbot, Cline and Egbert 2005), and only every kRestEvery-th packet of paths
-// goes on beyond its end. All of it is without bias. Noise is smaller than with a path for each pixel, and
-// alike in neighbouring pixels.
+// (resampled importance sampling: Talbot, Cline and Egbert 2005), and only every kRestEvery-th packet of
+// paths goes on beyond its end. All of it is without bias. Noise is smaller than with a path for each pixel,
+// and alike in neighbouring pixels.
 #pragma once
 
 #include <array>
@@ -111,8 +111,8 @@ class SharedPaths {
     Lanes3 origin[kBlocks];
   };
 
-  // A packet's starts. Its lanes lie a packet count apart in the order of all paths, each of which has a share
-  // of the places for its own: together their densities are those of any path from any place.
+  // A packet's starts. Its lanes lie a packet count apart in the order of all paths, each of which has a
+  // share of the places for its own: together their densities are those of any path from any place.
   BounceStart Start(const Places& places, const TileSample<kCoat>& tile, uint64_t seed, uint64_t key,
                     int sample, int packet, int packets, int source[kLanes]) const {
     BounceStart start;
@@ -164,8 +164,9 @@ class SharedPaths {
       const Lanes3 direction = Normalized(point - seen.point);
       Lanes3 light = end.RadianceTo(direction * Broadcast(-1));
       if constexpr (kCoat) light = light * seen.coat->Transmission(seen.lanes(), direction);
-      tile->indirect[block] = tile->indirect[block] + Select(joined,
-                              seen.albedo * light * (coupling[block] * (share / total)), Lanes3{});
+      tile->indirect[block] =
+          tile->indirect[block] +
+          Select(joined, seen.albedo * light * (coupling[block] * (share / total)), Lanes3{});
     }
   }
 

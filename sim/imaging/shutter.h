@@ -10,9 +10,9 @@
 //   exposure  0.5  of the frame interval, 0…1
 //   readout   0    from the first row to the last, of the frame interval, −1…1: 0 is a global shutter
 //
-// Four rows at a time are read out together, and the samples of 4 × 4 pixels share their times, which fill
-// the exposure evenly from sample to sample: use 16 samples or more. The automatic gain's small picture
-// stands still.
+// Four rows at a time are read out together (for light from wall to wall: sixteen), and the samples of 4 × 4
+// pixels share their times, which fill the exposure evenly from sample to sample: use 16 samples or more. The
+// automatic gain's small picture stands still.
 #pragma once
 
 #include <vector>

@@ -40,8 +40,8 @@ const Lanes3 kSlopes = [] {
   Lanes3 slopes;
   // A gradient is that of a linear function, read off at unit steps.
   for (uint32_t hash = 0; hash < kLanes; ++hash) {
-    slopes.Set(static_cast<int>(hash), {GradientDot(hash, 1, 0, 0), GradientDot(hash, 0, 1, 0),
-                                        GradientDot(hash, 0, 0, 1)});
+    slopes.Set(static_cast<int>(hash),
+               {GradientDot(hash, 1, 0, 0), GradientDot(hash, 0, 1, 0), GradientDot(hash, 0, 0, 1)});
   }
   return slopes;
 }();
@@ -99,8 +99,7 @@ Lanes Noise(uint32_t seed, const Lanes3& point) {
 // Two octaves, scaled to stay within ±1: the noise in clouds.
 Lanes Clouds(uint64_t seed, float scale_mm, const Lanes3& place) {
   const Lanes3 scaled = place * Broadcast(1 / scale_mm);
-  return (Noise(NoiseSeed(seed), scaled) + 0.5f * Noise(NoiseSeed(seed + 1), scaled * Broadcast(2))) /
-         1.5f;
+  return (Noise(NoiseSeed(seed), scaled) + 0.5f * Noise(NoiseSeed(seed + 1), scaled * Broadcast(2))) / 1.5f;
 }
 
 // 1 on the middle of a vessel, 0 beyond its width. The noise field is bent by another one, so that vessels
@@ -174,9 +173,10 @@ Lanes3 NoiseGradient(uint64_t seed, const Lanes3& points) {
                           dz ? weight.z : 1.0f - weight.z};
     const Lanes3 growth = {dx ? steepness.x : -steepness.x, dy ? steepness.y : -steepness.y,
                            dz ? steepness.z : -steepness.z};
-    gradient = gradient + slopes * (share.x * share.y * share.z) +
-               Lanes3{growth.x * share.y * share.z, share.x * growth.y * share.z,
-                      share.x * share.y * growth.z} * value;
+    gradient =
+        gradient + slopes * (share.x * share.y * share.z) +
+        Lanes3{growth.x * share.y * share.z, share.x * growth.y * share.z, share.x * share.y * growth.z} *
+            value;
   }
   return gradient;
 }

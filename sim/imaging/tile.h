@@ -20,14 +20,13 @@ static_assert(kBlockEdge * kBlockEdge == kLanes);
 template <bool kCoat>
 struct TileSample {
   PlacesOf<kCoat> places[kBlocks];  // that the pixels see
-  LobesOf<kCoat> direct[kBlocks];
   Lanes3 indirect[kBlocks];
 };
 
 // Where a tile lies. The tile may reach beyond the image.
 struct TilePixels {
   int x0, y0;
-  LanesI on[kBlocks];       // −1: a pixel that is rendered
+  LanesI on[kBlocks];            // −1: a pixel that is rendered
   Lanes x[kBlocks], y[kBlocks];  // of the pixels' centres
 
   int X(int block, int lane) const { return x0 + block % kBlocksAcross * kBlockEdge + lane % kBlockEdge; }
