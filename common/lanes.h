@@ -109,6 +109,16 @@ inline Lanes Gather(const float* table, const LanesI& index) {
 #endif
 }
 
+inline LanesI Gather(const int32_t* table, const LanesI& index) {
+#ifdef __AVX512F__
+  return (LanesI)_mm512_mask_i32gather_epi32(__m512i{}, 0xffff, (__m512i)index, table, sizeof(int32_t));
+#else
+  LanesI gathered;
+  for (int i = 0; i < kLanes; ++i) gathered[i] = table[index[i]];
+  return gathered;
+#endif
+}
+
 // eˣ, to 2 units in the last place; 0 below −87 (e^−87 is the last that is a normal number), e^88 above 88.
 // Cody and Waite's reduction by ln 2 in two parts, then Cephes's polynomial of degree 7 (Moshier, expf).
 inline Lanes Exp(const Lanes& x) {

@@ -145,6 +145,9 @@ struct RayScene::State {
   Vec3d anchor;
   std::vector<Vec3f> face_normals;
   RTCScene scene;
+  // Embree's own copies: three numbers a vertex and a face; null for a mesh without faces.
+  const float* vertices = nullptr;
+  const int32_t* corners = nullptr;
 
   explicit State(const Mesh& mesh) : mesh(&mesh), anchor(Vec3d::Zero()) {
     CheckFaces(mesh);
@@ -178,14 +181,16 @@ struct RayScene::State {
 
   void Attach(RTCDevice device) {
     const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* vertices = static_cast<float*>(rtcSetNewGeometryBuffer(
+    auto* to_vertices = static_cast<float*>(rtcSetNewGeometryBuffer(
         geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), mesh->vertices.size()));
     auto* indices = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(
         geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), mesh->faces.size()));
-    if (vertices && indices) {
+    if (to_vertices && indices) {
+      vertices = to_vertices;
+      corners = reinterpret_cast<const int32_t*>(indices);
       for (const Vec3d& vertex : mesh->vertices) {
         const Vec3f local = (vertex - anchor).cast<float>();
-        vertices = std::copy_n(local.data(), 3, vertices);
+        to_vertices = std::copy_n(local.data(), 3, to_vertices);
       }
       for (const Vec3i& face : mesh->faces) indices = std::copy_n(face.data(), 3, indices);
       rtcCommitGeometry(geometry);
@@ -243,6 +248,19 @@ LanesI RayScene::Occluded(const RayPacket& rays) const {
   Trace(state_->scene, valid, &query);
   // Rays that are off keep their tfar, which isn't infinite.
   return Load(query.tfar) == -std::numeric_limits<float>::infinity();
+}
+
+Lanes3 RayScene::Points(const HitPacket& hits) const {
+  const LanesI face = LoadI(hits.face) * 3;
+  const LanesI met = LoadI(hits.face) != static_cast<int32_t>(kNoFace);
+  const float* const vertices = state_->vertices;
+  if (!vertices) return Lanes3{};
+  const auto corner = [&](int i) {
+    const LanesI vertex = Gather(state_->corners, met ? face + i : LanesI{}) * 3;
+    return Lanes3{Gather(vertices, vertex), Gather(vertices, vertex + 1), Gather(vertices, vertex + 2)};
+  };
+  const Lanes3 a = corner(0);
+  return a + (corner(1) - a) * Load(hits.u) + (corner(2) - a) * Load(hits.v);
 }
 
 const std::vector<Vec3f>& RayScene::face_normals() const { return state_->face_normals; }

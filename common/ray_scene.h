@@ -60,6 +60,11 @@ class RayScene {
   // −1 in the lanes whose ray meets anything, 0 in the others.
   LanesI Occluded(const RayPacket& rays) const;
 
+  // The places that were met, in the rays' coordinates, from their barycentric coordinates: off the face's
+  // plane by no more than the rounding of the corners' own coordinates, as offsetting a ray's origin
+  // supposes. Lanes that met nothing give any place.
+  Lanes3 Points(const HitPacket& hits) const;
+
   // Unit normals of the faces, by the order of their corners; 0 for a face without area. Computed in double.
   const std::vector<Vec3f>& face_normals() const;
 

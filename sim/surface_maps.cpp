@@ -45,7 +45,8 @@ ImageF ShadingNormalMap(const Surface& surface, uint64_t surface_seed, const Vec
   ImageF normals = NothingLike(truth.position);
   ForEachPlace(anchor_mm, truth, [&](const Vec3f& place, int x, int y) {
     const Vec3f smooth = Eigen::Map<const Vec3f>(truth.smooth_normal.Pixel(x, y));
-    const Vec3f relief = surface.coat->ReliefNormal(surface_seed, place, rotation * smooth);
+    const Vec3f relief =
+        surface.coat->ReliefNormal(surface_seed, Broadcast(place), Broadcast(Vec3f(rotation * smooth)))[0];
     const Vec3f normal = rotation.transpose() * relief;
     std::copy_n(normal.data(), 3, normals.Pixel(x, y));
   });

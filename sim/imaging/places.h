@@ -60,8 +60,7 @@ class PlaceFinder {
       }
     }
     const Lanes3 direction = Load3(rays.direction);
-    const Lanes3 point = Load3(rays.origin) + direction * Load(hits.t);
-    places.point = Select(places.alive, point, Broadcast(point[model]));
+    places.point = scene_.wall->Points(known);
     const float* const normals = scene_.wall->face_normals().front().data();
     const LanesI first = LoadI(known.face) * 3;
     const Lanes3 normal = {Gather(normals, first), Gather(normals, first + 1), Gather(normals, first + 2)};
