@@ -76,11 +76,16 @@ class Renderer {
   bool WantsParts() const { return Wants("direct") || Wants("indirect") || Wants("glint"); }
 
   PathScene PathSceneOf(const WallMoment& wall) const {
-    return {&wall.rays, &scene_.surface, surface_seed_, &wall.vertex_normals};
+    PathScene path_scene{&wall.rays, &scene_.surface, surface_seed_, &wall.vertex_normals};
+    if (walls_.moves()) {
+      path_scene.rest = &scene_.geometry.mesh;
+      path_scene.rest_anchor = rest_anchor_;
+    }
+    return path_scene;
   }
 
   View ViewOf(int frame, const Camera<float>& camera, const Image8& valid) const {
-    return {&camera, &valid, scene_.world_from_camera[frame], &scene_.calibration.light, nullptr};
+    return {&camera, &valid, scene_.world_from_camera[frame], &scene_.calibration.light};
   }
 
   std::vector<double> Gains() {
@@ -116,6 +121,7 @@ class Renderer {
   void RenderOne(int frame, double gain) {
     const std::shared_ptr<const WallMoment> wall = walls_.At(frame);
     View view = ViewOf(frame, fast_camera_, valid_);
+    if (scene_.defocus) view.defocus = &*scene_.defocus;
     std::optional<CameraMotion> motion;
     if (scene_.sensor.shutter) {
       view.motion = &motion.emplace(*scene_.sensor.shutter, scene_.world_from_camera, frame);

@@ -84,6 +84,7 @@ std::vector<std::string> NameEffects(const Scene& scene) {
     effects.push_back("offset_guides");
   }
   if (scene.calibration.response.vignetting > 0) effects.push_back("vignetting");
+  if (scene.defocus) effects.push_back("defocus");
   if (scene.chromatic_aberration) effects.push_back("chromatic_aberration");
   if (scene.sensor.shutter) effects.push_back("shutter");
   if (scene.sensor.auto_gain) effects.push_back("auto_gain");
@@ -148,6 +149,7 @@ Scene ReadScene(const std::filesystem::path& file, const std::vector<std::string
   scene.surface = ReadSurface(root.Table("surface"));
   if (const auto path = root.Optional("path")) scene.path = ReadPath(*path);
   if (const auto lens = root.Optional("lens")) {
+    if (const auto table = lens->Optional("defocus")) scene.defocus = ReadDefocus(*table);
     if (const auto table = lens->Optional("chromatic_aberration")) {
       scene.chromatic_aberration = ReadChromaticAberration(*table);
     }

@@ -10,6 +10,7 @@
 #include "sim/geometry/geometry.h"
 #include "sim/geometry/peristalsis.h"
 #include "sim/imaging/chromatic_aberration.h"
+#include "sim/imaging/defocus.h"
 #include "sim/imaging/path.h"
 #include "sim/imaging/sensor.h"
 #include "sim/imaging/surface.h"
@@ -29,6 +30,7 @@ struct Scene {
   std::vector<Pose> world_from_camera;
   Surface surface;
   PathOptions path;
+  std::optional<Defocus> defocus;
   std::optional<ChromaticAberration> chromatic_aberration;
   Sensor sensor;
   TruthOptions truth;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/random.h"
+#include "tests/path_stage.h"
 #include "tests/support.h"
 
 namespace lumen {
@@ -109,6 +110,42 @@ TEST(Defocus, NoApertureIsExactlyThePinhole) {
       EXPECT_EQ(ray.direction, w);
     }
   }
+}
+
+// The edge of a plate 8 mm away before a wall 16 mm away, which is in focus. A place (x, y) on the aperture
+// sees the plate where x/2 + 8·w < 0, w being the pixel's tangent: a part of the disc that a chord cuts off.
+// The wall beside the edge is lit as far as the camera's centre, where the light is, sees it, and behind it
+// dark also for the places on the aperture that see past the edge.
+TEST(Defocus, BlursAnEdgeAndItsShadow) {
+  constexpr int kWidth = 64, kSamples = 4096;
+  constexpr double kFocal_px = 400, kRadius_mm = 0.5;
+  Mesh mesh;
+  test::AddPlate(&mesh, -40, 0, -40, 40, 8);
+  test::AddPlate(&mesh, -80, 80, -80, 80, 16);
+  test::Stage stage(std::move(mesh), test::CentredPinhole(kWidth, 2, kFocal_px), 500);
+  stage.surface.albedo = Vec3d::Constant(0.5);
+  stage.options.samples = kSamples;
+  const auto lit = [&](double z, double w) { return 500 * 0.5 / kPi / (z * z) * std::pow(1 + w * w, -1.5); };
+  const auto largest_error = [&](const Film& film) {
+    double largest = 0;
+    for (int x = 0; x < kWidth; ++x) {
+      const double w = (x - stage.intrinsics.cx) / kFocal_px;
+      const double t = std::clamp(16 * w / kRadius_mm, -1.0, 1.0);
+      const double plate = 0.5 - (t * std::sqrt(1 - t * t) + std::asin(t)) / kPi;
+      const double expected = plate * lit(8, w) + (w > 0 ? (1 - plate) * lit(16, w) : 0);
+      largest = std::max(largest, std::abs(film.radiance.Pixel(x, 0)[0] - expected) / lit(8, 0));
+    }
+    return largest;
+  };
+  Film film;
+  const Defocus defocus = {2 * kRadius_mm, 16};
+  stage.Render(1, false, &film, &defocus);
+  // Five standard deviations of a binomial's mean, at most 0.5/√samples each; less, since samples are spread.
+  EXPECT_LT(largest_error(film), 5 * 0.5 / std::sqrt(double(kSamples)));
+  const Defocus another = {2 * kRadius_mm * 1.2, 16};
+  stage.Render(1, false, &film, &another);
+  EXPECT_GT(largest_error(film), 5 * 0.5 / std::sqrt(double(kSamples)));
+  EXPECT_GT(largest_error(stage.Render()), 0.3);  // a pinhole's edge is sharp
 }
 
 }  // namespace

@@ -61,6 +61,15 @@ TEST_F(EffectsTest, ShutterChangesThePictureOnly) {
   EXPECT_EQ(Differing(without, RenderTo("instant", {exact, "sensor.shutter.exposure=0"})), Names{});
 }
 
+// The gains are those of a sharp picture.
+TEST_F(EffectsTest, DefocusChangesThePictureOnly) {
+  const std::string exact = "truth.exact=[\"albedo\", \"z\", \"normal\", \"position\", \"flow\"]";
+  const fs::path without = RenderTo("without", {exact});
+  EXPECT_EQ(Differing(without, RenderTo("with", {exact, "lens.defocus.aperture_mm=0.5"})),
+            Names{"0001_color.png"});
+  EXPECT_EQ(Differing(without, RenderTo("pinhole", {exact, "lens.defocus.aperture_mm=0"})), Names{});
+}
+
 TEST_F(EffectsTest, LensAndRecorderChangeThePictureOnly) {
   const std::string exact = "truth.exact=[\"radiance\", \"direct\", \"indirect\", \"albedo\", \"z\"]";
   const fs::path without = RenderTo("without", {exact});

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "common/image.h"
+#include "common/random.h"
 #include "common/sequence.h"
 #include "sim/ground_truth.h"
 #include "sim/render.h"
@@ -276,6 +277,62 @@ TEST_F(MovingWallRender, ChangesWhatMoves) {
   }
   EXPECT_EQ(ReadFile(without / "mesh.ply"), ReadFile(with / "mesh.ply"));
   EXPECT_NE(ReadSequence(without).frames[1].gain, ReadSequence(with).frames[1].gain);
+}
+
+// The wall is lit where it is and wears the texture of where it was: a pixel's centre ray, light at the
+// camera.
+TEST_F(MovingWallRender, TextureTravelsWithTheWall) {
+  const std::vector<std::string> settings = {
+      kMoving[0],
+      kMoving[1],
+      "light.source.0.position=[0, 0, 0]",
+      "path.samples=1",
+      "path.bounces=0",
+      "sensor.gain=1",
+      "truth.exact=[\"radiance\", \"albedo\", \"distance\", \"normal\", \"position\"]"};
+  const fs::path scene_file = scratch_ / "plain.toml";
+  std::string text = test::kSmallScene;
+  text.erase(text.find("[sensor.auto_gain]"), std::string("[sensor.auto_gain]").size());
+  WriteFile(scene_file, text);
+  const Scene scene = ReadScene(scene_file, settings, kSeed);
+  Render(scene, {scratch_ / "out", 0, 3, kSeed});
+  const Camera<double> camera(scene.calibration.camera);
+  const Vec3d anchor = Bounds(scene.geometry.mesh).center();
+  double worst = 0, worst_standing = 0;
+  int compared = 0;
+  for (int frame = 0; frame < 3; ++frame) {
+    std::vector<std::string> names;
+    const ImageF all = ReadExr(scratch_ / "out" / "exact" / ("000" + std::to_string(frame) + ".exr"), &names);
+    const auto at = [&](const std::string& name, int x, int y) {
+      return double(all.Pixel(x, y)[std::find(names.begin(), names.end(), name) - names.begin()]);
+    };
+    for (int y = 0; y < all.height; ++y) {
+      for (int x = 0; x < all.width; ++x) {
+        const double distance = at("distance", x, y);
+        if (std::isnan(distance)) continue;
+        const Vec3d ray = *camera.Unproject(Vec2d(x, y));
+        const double cosine =
+            -ray.dot(Vec3d(at("normal.X", x, y), at("normal.Y", x, y), at("normal.Z", x, y)));
+        double irradiance = 0;
+        for (const LightSource& source : scene.calibration.light.sources) {
+          irradiance += source.intensity.x() * std::exp(-source.spread * (1 - ray.z())) * cosine /
+                        (distance * distance);
+        }
+        const double found = at("radiance.R", x, y) * kPi / irradiance;
+        const Vec3d place(at("position.X", x, y), at("position.Y", x, y), at("position.Z", x, y));
+        const Vec3f standing =
+            AlbedoAt(scene.surface, RandomBits(kSeed, 0x77616c6cull), Vec3f((place - anchor).cast<float>()));
+        // Where the light falls at a glance, rounding of the normal shows.
+        if (cosine < 0.05) continue;
+        worst = std::max(worst, std::abs(found - at("albedo.R", x, y)));
+        worst_standing = std::max(worst_standing, std::abs(found - standing.x()));
+        ++compared;
+      }
+    }
+  }
+  EXPECT_GT(compared, 4000);
+  EXPECT_LT(worst, 1e-3);
+  EXPECT_GT(worst_standing, 0.05);
 }
 
 TEST_F(MovingWallRender, RefusesAFrameThatTheWallPasses) {

@@ -68,10 +68,10 @@ Stage::Stage(Mesh geometry, const CameraIntrinsics& intrinsics, double intensity
   options.samples = 1;
 }
 
-PathCount Stage::Render(uint64_t seed, bool with_parts, Film* film) const {
+PathCount Stage::Render(uint64_t seed, bool with_parts, Film* film, const Defocus* defocus) const {
   const Camera<float> camera(intrinsics);
-  return RenderFrame({&wall, &surface, 0, &vertex_normals}, {&camera, &valid, world_from_camera, &light},
-                     options, seed, 0, with_parts, film);
+  const View view = {&camera, &valid, world_from_camera, &light, nullptr, defocus};
+  return RenderFrame({&wall, &surface, 0, &vertex_normals}, view, options, seed, 0, with_parts, film);
 }
 
 Film Stage::Render(uint64_t seed, bool with_parts) const {

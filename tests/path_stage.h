@@ -39,7 +39,7 @@ struct Stage {
   // The light: at the camera, the same in all directions.
   Stage(Mesh geometry, const CameraIntrinsics& intrinsics, double intensity = 500);
 
-  PathCount Render(uint64_t seed, bool with_parts, Film* film) const;
+  PathCount Render(uint64_t seed, bool with_parts, Film* film, const Defocus* defocus = nullptr) const;
   // Expects everything to be finite.
   Film Render(uint64_t seed = 1, bool with_parts = false) const;
 };

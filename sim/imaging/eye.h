@@ -17,14 +17,15 @@ struct Guide {
 };
 
 struct Eye {
-  Eye(const RayScene& wall, const Light& light, const Pose& world_from_camera)
+  // pinhole: all of the camera's rays start at its centre.
+  Eye(const RayScene& wall, const Light& light, const Pose& world_from_camera, bool pinhole)
       : origin(wall.ToLocal(world_from_camera.translation())),
         rotation(world_from_camera.linear().cast<float>()) {
     for (const LightSource& source : light.sources) {
       guides.push_back({wall.ToLocal(world_from_camera * source.position),
                         (world_from_camera.linear() * source.direction).cast<float>(),
                         static_cast<float>(source.spread), source.intensity.cast<float>(),
-                        source.position.isZero(0)});
+                        pinhole && source.position.isZero(0)});
     }
   }
 

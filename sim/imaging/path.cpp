@@ -23,6 +23,7 @@ enum : uint32_t {
   kPixelPair = 0,
   kOwnPairs = 1,           // of the pixel's own bounce path
   kGlintPairs = 1u << 30,  // of the path that leaves in the coat's mirror direction
+  kLensPair = 0xfffffffeu,
   kTimePair = 0xffffffffu
 };
 
@@ -48,7 +49,8 @@ class Tracer {
         finder_(scene),
         own_paths_(scene, options),
         shared_paths_(scene, options),
-        eye_(*scene.wall, *view.light, view.world_from_camera) {}
+        pinhole_(!view.defocus || view.defocus->aperture_mm == 0),
+        eye_(*scene.wall, *view.light, view.world_from_camera, pinhole_) {}
 
   // Direct light first; light from wall to wall takes a pass over the frame for each sample, on a grid of
   // tiles shifted at random, so that what a tile's pixels have in common leaves no edges. It looks again
@@ -214,7 +216,7 @@ class Tracer {
   Eye EyeAt(double row, uint64_t key, int sample) const {
     const double height = std::clamp(row / view_.valid->height, 0.0, 1.0);
     const double random = Sampler(seed_, key, static_cast<uint32_t>(sample)).Pair(kTimePair)[0];
-    return Eye(*scene_.wall, *view_.light, view_.motion->At(view_.motion->Time(height, random)));
+    return Eye(*scene_.wall, *view_.light, view_.motion->At(view_.motion->Time(height, random)), pinhole_);
   }
   Eye EyeOf(const TilePixels& pixels, int block, int sample) const {
     return EyeAt(pixels.Y(block, 0) + kBlockEdge / 2, PixelKey(pixels, block, 0), sample);
@@ -243,19 +245,37 @@ class Tracer {
     }
     Lanes3 in_camera;
     const LanesI seen = view_.camera->Unproject(x, y, &in_camera) & pixels.on[block];
-    const Mat3<float>& r = eye.rotation;
-    const auto row = [&](int i) {
-      return r(i, 0) * in_camera.x + r(i, 1) * in_camera.y + r(i, 2) * in_camera.z;
-    };
     RayPacket rays;
     Store3(Broadcast(eye.origin), rays.origin);
-    Store3({row(0), row(1), row(2)}, rays.direction);
+    if (!pinhole_) {
+      const Lanes3 on_aperture = PassLens(jitter, sample, &in_camera);
+      Store3(Broadcast(eye.origin) + Rotated(eye.rotation, on_aperture), rays.origin);
+    }
+    Store3(Rotated(eye.rotation, in_camera), rays.direction);
     Store(Lanes{}, rays.tnear);
     Store(seen ? Broadcast(kFar) : Broadcast(-1), rays.tfar);
     HitPacket hits;
     scene_.wall->Intersect(rays, &hits);
     count->rays += Count(seen);
     return finder_.Find(rays, hits, false);
+  }
+
+  static Lanes3 Rotated(const Mat3<float>& r, const Lanes3& v) {
+    const auto row = [&](int i) { return r(i, 0) * v.x + r(i, 1) * v.y + r(i, 2) * v.z; };
+    return {row(0), row(1), row(2)};
+  }
+
+  // Turns directions to those of rays from places on the aperture, which are returned; camera axes.
+  Lanes3 PassLens(const SamplerLanes& jitter, int sample, Lanes3* direction) const {
+    Lanes u, v;
+    jitter.Pair(BroadcastU(static_cast<uint32_t>(sample)), kLensPair, &u, &v);
+    Lanes3 origin;
+    for (int i = 0; i < kLanes; ++i) {
+      const LensRay ray = ThroughLens(*view_.defocus, (*direction)[i], Vec2f(u[i], v[i]));
+      origin.Set(i, ray.origin);
+      direction->Set(i, ray.direction);
+    }
+    return origin;
   }
 
   void AddDirect(const Eye& eye, const PlacesOf<kCoat>& places, LobesOf<kCoat>* direct,
@@ -329,6 +349,7 @@ class Tracer {
   const PlaceFinder<kCoat> finder_;
   const BouncePaths<kCoat> own_paths_;
   const SharedPaths<kCoat> shared_paths_;
+  const bool pinhole_;
   const Eye eye_;                 // at the frame's moment
   std::vector<double> indirect_;  // sums over samples, RGB of each pixel
   std::once_flag any_lost_;

@@ -10,6 +10,7 @@
 #include "common/light.h"
 #include "common/math.h"
 #include "common/ray_scene.h"
+#include "sim/imaging/defocus.h"
 #include "sim/imaging/shutter.h"
 #include "sim/imaging/surface.h"
 
@@ -38,6 +39,7 @@ struct View {
   Pose world_from_camera;
   const Light* light;                    // in camera axes
   const CameraMotion* motion = nullptr;  // while the frame is taken; none: it is taken in an instant
+  const Defocus* defocus = nullptr;      // of the lens; none: a pinhole
 };
 
 // Linear radiance, RGB, 1 = full scale; the parts only if asked for.
