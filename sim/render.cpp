@@ -73,7 +73,9 @@ class Renderer {
            scene_.truth.exact.end();
   }
 
-  bool WantsParts() const { return Wants("direct") || Wants("indirect") || Wants("glint"); }
+  bool WantsParts() const {
+    return Wants("direct") || Wants("indirect") || Wants("glint") || Wants("subsurface");
+  }
 
   PathScene PathSceneOf(const WallMoment& wall) const {
     PathScene path_scene{&wall.rays, &scene_.surface, surface_seed_, &wall.vertex_normals};
@@ -129,8 +131,10 @@ class Renderer {
     Film film;
     const PathCount count =
         RenderFrame(PathSceneOf(*wall), view, scene_.path, options_.seed, frame, WantsParts(), &film);
-    // Without a coat there is no glint.
-    if (Wants("glint") && film.glint.empty()) film.glint = ImageF(valid_.width, valid_.height, 3);
+    // Without a coat there is no glint, without tissue nothing comes from below the surface.
+    for (const auto& [part, image] : {std::pair("glint", &film.glint), {"subsurface", &film.subsurface}}) {
+      if (Wants(part) && image->empty()) *image = ImageF(valid_.width, valid_.height, 3);
+    }
     result_.samples += count.samples;
     result_.rays += count.rays;
     NoteFailure(frame, "", count.failure);
@@ -206,6 +210,7 @@ class Renderer {
     add("direct", film.direct, rgb);
     add("indirect", film.indirect, rgb);
     add("glint", film.glint, rgb);
+    add("subsurface", film.subsurface, rgb);
     if (Wants("albedo")) add("albedo", AlbedoMap(scene_.surface, surface_seed_, rest_anchor_, truth), rgb);
     add("z", truth.z, one);
     add("distance", truth.distance, one);

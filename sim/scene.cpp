@@ -78,6 +78,7 @@ std::vector<std::string> NameEffects(const Scene& scene) {
   if (scene.path.bounces > 0) effects.push_back("interreflection");
   if (scene.surface.mottling) effects.push_back("mottling");
   if (scene.surface.vessels) effects.push_back("vessels");
+  if (scene.surface.subsurface) effects.push_back("subsurface");
   if (scene.surface.coat) effects.push_back("coat");
   const auto& sources = scene.calibration.light.sources;
   if (std::any_of(sources.begin(), sources.end(), [](const auto& s) { return !s.position.isZero(0); })) {
@@ -131,9 +132,9 @@ void CheckEndoscopeInLumen(const Scene& scene, const std::filesystem::path& file
 
 const std::vector<std::string>& ExactChannels() {
   static const std::vector<std::string> channels = {
-      "radiance",  "direct",     "indirect",       "glint",    "albedo", "z",
-      "distance",  "normal",     "shading_normal", "position", "flow",   "seen_before",
-      "flow_next", "seen_after", "visibility",     "mesh"};
+      "radiance",    "direct",    "indirect",   "glint",          "subsurface", "albedo",
+      "z",           "distance",  "normal",     "shading_normal", "position",   "flow",
+      "seen_before", "flow_next", "seen_after", "visibility",     "mesh"};
   return channels;
 }
 

@@ -11,6 +11,7 @@
 #include "sim/imaging/path.h"
 #include "sim/imaging/places.h"
 #include "sim/imaging/sampler.h"
+#include "sim/imaging/tissue_walks.h"
 
 namespace lumen {
 
@@ -45,6 +46,7 @@ struct FarEnds;
 template <>
 struct FarEnds<false> {
   Places places;
+  Places entries;   // where light comes in that leaves the places; set only where there is tissue
   Lanes3 radiance;  // to all sides
 
   // One lane's in all lanes.
@@ -93,14 +95,21 @@ template <bool kCoat>
 class BouncePaths {
  public:
   BouncePaths(const PathScene& scene, const PathOptions& options)
-      : wall_(*scene.wall), options_(options), finder_(scene) {}
+      : wall_(*scene.wall), options_(options), finder_(scene) {
+    if (scene.surface->subsurface) walks_.emplace(scene);
+  }
 
   // Where the rays end and what of the guides' light is sent from there. Rays are counted.
   FarEnds<kCoat> End(const Eye& eye, const BounceStart& start, BouncePairs pairs, int64_t* rays) const {
     FarEnds<kCoat> ends;
-    ends.places = Trace(start.on, start.origin, start.direction, rays);
-    const ChosenLight light = LightFromOneGuide<kCoat>(
-        wall_, eye, ends.places, Numbers(start, ends.places.alive, pairs.Guide(1)), rays);
+    HitPacket hits;
+    ends.places = Trace(start.on, start.origin, start.direction, &hits, rays);
+    if constexpr (!kCoat) {
+      if (walks_) ends.entries = Entries(hits, ends.places, 1, start, rays);
+    }
+    const PlacesOf<kCoat>& lit = Lit(ends);
+    const ChosenLight light =
+        LightFromOneGuide<kCoat>(wall_, eye, lit, Numbers(start, lit.alive, pairs.Guide(1)), rays);
     if constexpr (kCoat) {
       ends.arrivals[0] = typename FarEnds<kCoat>::Arrival{light.toward, light.irradiance};
       ends.arrivals[1] = typename FarEnds<kCoat>::Arrival{light.toward, Lanes3{}};
@@ -113,14 +122,18 @@ class BouncePaths {
   // Adds the light that comes to the ends from other walls, times `share`.
   void AddRest(const Eye& eye, const BounceStart& start, BouncePairs pairs, float share, FarEnds<kCoat>* ends,
                int64_t* rays) const {
-    PlacesOf<kCoat> places = ends->places;
+    PlacesOf<kCoat> places = Lit(*ends);
     Lanes3 throughput = Broadcast(Vec3f(1, 1, 1)), weight = start.weight, incoming{};
     for (int bounce = 2; bounce <= options_.bounces && Any(places.alive); ++bounce) {
       const Lanes3 direction = NextDirections(start, pairs, bounce, &places, &throughput, &weight);
       if constexpr (kCoat) {
         if (bounce == 2) ends->arrivals[1].toward = direction;
       }
-      places = Trace(places.alive, OffsetOrigin(places.point, places.normal), direction, rays);
+      HitPacket hits;
+      places = Trace(places.alive, OffsetOrigin(places.point, places.normal), direction, &hits, rays);
+      if constexpr (!kCoat) {
+        if (walks_) places = Entries(hits, places, bounce, start, rays);
+      }
       const ChosenLight light = LightFromOneGuide<kCoat>(
           wall_, eye, places, Numbers(start, places.alive, pairs.Guide(bounce)), rays);
       incoming = incoming + Select(places.alive, throughput * light.sent, Lanes3{});
@@ -129,7 +142,7 @@ class BouncePaths {
     if constexpr (kCoat) {
       ends->arrivals[1].light = incoming;
     } else {
-      ends->radiance = ends->radiance + ends->places.albedo * incoming;
+      ends->radiance = ends->radiance + Lit(*ends).albedo * incoming;
     }
   }
 
@@ -176,11 +189,25 @@ class BouncePaths {
     return direction;
   }
 
-  PlacesOf<kCoat> Trace(const LanesI& on, const Lanes3& origin, const Lanes3& direction,
+  // Where light comes in that leaves the ends. Below a coat that is the ends themselves: its glints would
+  // need a path of their own.
+  const PlacesOf<kCoat>& Lit(const FarEnds<kCoat>& ends) const {
+    if constexpr (!kCoat) {
+      if (walks_) return ends.entries;
+    }
+    return ends.places;
+  }
+
+  Places Entries(const HitPacket& hits, const Places& places, int bounce, const BounceStart& start,
+                 int64_t* rays) const {
+    return walks_->Entries(
+        hits, places, bounce, [&](int i) { return *start.samplers[i]; }, rays);
+  }
+
+  PlacesOf<kCoat> Trace(const LanesI& on, const Lanes3& origin, const Lanes3& direction, HitPacket* hits,
                         int64_t* rays) const {
     constexpr float kFar = 1e30f;
     RayPacket packet;
-    HitPacket hits;
     Store3(origin, packet.origin);
     Store3(direction, packet.direction);
     for (int i = 0; i < kLanes; ++i) {
@@ -189,12 +216,14 @@ class BouncePaths {
         hit = wall_.Intersect(origin[i], direction[i], 0, kFar);
         ++*rays;
       }
-      hits.face[i] = hit.face;
-      hits.t[i] = hit.t;
-      hits.u[i] = hit.u;
-      hits.v[i] = hit.v;
+      hits->face[i] = hit.face;
+      hits->t[i] = hit.t;
+      hits->u[i] = hit.u;
+      hits->v[i] = hit.v;
     }
-    return finder_.Find(packet, hits, true);
+    PlacesOf<kCoat> places = finder_.Find(packet, *hits, true);
+    if (kCoat && walks_) places.albedo = walks_->EvenAlbedo(places.albedo);
+    return places;
   }
 
   static Lanes Numbers(const BounceStart& start, const LanesI& alive, uint32_t pair) {
@@ -208,6 +237,7 @@ class BouncePaths {
   const RayScene& wall_;
   const PathOptions options_;
   PlaceFinder<kCoat> finder_;
+  std::optional<TissueWalks<kCoat>> walks_;
 };
 
 }  // namespace lumen

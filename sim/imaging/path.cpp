@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <mutex>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "common/parallel.h"
@@ -12,6 +14,7 @@
 #include "sim/imaging/sampler.h"
 #include "sim/imaging/shared_paths.h"
 #include "sim/imaging/tile.h"
+#include "sim/imaging/tissue_walks.h"
 
 namespace lumen {
 namespace {
@@ -50,7 +53,9 @@ class Tracer {
         own_paths_(scene, options),
         shared_paths_(scene, options),
         pinhole_(!view.defocus || view.defocus->aperture_mm == 0),
-        eye_(*scene.wall, *view.light, view.world_from_camera, pinhole_) {}
+        eye_(*scene.wall, *view.light, view.world_from_camera, pinhole_) {
+    if (scene.surface->subsurface) walks_.emplace(scene);
+  }
 
   // Direct light first; light from wall to wall takes a pass over the frame for each sample, on a grid of
   // tiles shifted at random, so that what a tile's pixels have in common leaves no edges. It looks again
@@ -60,12 +65,14 @@ class Tracer {
     film->radiance = ImageF(width, height, 3);
     if (with_parts) film->direct = film->indirect = film->radiance;
     if (with_parts && kCoat) film->glint = film->radiance;
+    if (with_parts && walks_) film->subsurface = film->radiance;
     PathCount total;
     ForEachTile(0, 0, &total, [&](const TilePixels& pixels, uint64_t, PathCount* count) {
       TraceDirect(pixels, film, count);
     });
     if (options_.bounces == 0) return total;
     indirect_.resize(film->radiance.data.size());
+    if (kCoat && walks_) mirrored_.resize(indirect_.size());
     for (int sample = 0; sample < options_.samples; ++sample) {
       const uint64_t shift = RandomBits(seed_, frame_, kShiftKey, static_cast<uint64_t>(sample));
       ForEachTile(static_cast<int>(shift % kTileEdge), static_cast<int>(shift / kTileEdge % kTileEdge),
@@ -104,6 +111,7 @@ class Tracer {
   }
 
   void TraceDirect(const TilePixels& pixels, Film* film, PathCount* count) const {
+    ImageF& scattered = walks_ ? film->subsurface : film->direct;
     for (int block = 0; block < kBlocks; ++block) {
       if (!Any(pixels.on[block])) continue;
       const SamplerLanes jitter = JitterOf(pixels, block);
@@ -112,10 +120,9 @@ class Tracer {
       for (int sample = 0; sample < options_.samples; ++sample) {
         LobesOf<kCoat> light{};
         if (view_.motion) {
-          const Eye eye = EyeOf(pixels, block, sample);
-          AddDirect(eye, Look(eye, pixels, block, jitter, sample, count), &light, count);
+          AddDirectOfBlock(EyeOf(pixels, block, sample), pixels, block, jitter, sample, &light, count);
         } else {
-          AddDirect(eye_, Look(eye_, pixels, block, jitter, sample, count), &light, count);
+          AddDirectOfBlock(eye_, pixels, block, jitter, sample, &light, count);
         }
         const LanesI finite = IsFinite(Sum(light.Whole()));
         if (Any(pixels.on[block] & ~finite)) {
@@ -136,11 +143,31 @@ class Tracer {
         for (int c = 0; c < 3; ++c) {
           const double base = share * sums[0][c][i], glint = kCoat ? share * sums[kCoat][c][i] : 0;
           film->radiance.Pixel(x, y)[c] = static_cast<float>(base + glint);
-          if (!film->direct.empty()) film->direct.Pixel(x, y)[c] = static_cast<float>(base);
+          if (!scattered.empty()) scattered.Pixel(x, y)[c] = static_cast<float>(base);
           if (!film->glint.empty()) film->glint.Pixel(x, y)[c] = static_cast<float>(glint);
         }
       }
     }
+  }
+
+  void AddDirectOfBlock(const Eye& eye, const TilePixels& pixels, int block, const SamplerLanes& jitter,
+                        int sample, LobesOf<kCoat>* light, PathCount* count) const {
+    HitPacket hits;
+    const PlacesOf<kCoat> places = Look(eye, pixels, block, jitter, sample, &hits, count);
+    if (kCoat || !walks_) AddDirect(eye, places, true, light, count);
+    if (!walks_) return;
+    LobesOf<kCoat> scattered{};
+    AddDirect(eye, Entries(hits, places, pixels, block, sample, count), false, &scattered, count);
+    light->base = scattered.base;
+  }
+
+  // Where what is seen of tissue came in.
+  PlacesOf<kCoat> Entries(const HitPacket& hits, const PlacesOf<kCoat>& places, const TilePixels& pixels,
+                          int block, int sample, PathCount* count) const {
+    const auto sampler = [&](int i) {
+      return Sampler(seed_, PixelKey(pixels, block, i), static_cast<uint32_t>(sample));
+    };
+    return walks_->Entries(hits, places, 0, sampler, &count->rays);
   }
 
   static void Accumulate(const Lanes3& light, double (*sums)[kLanes]) {
@@ -170,25 +197,41 @@ class Tracer {
       shared_paths_.Add(view_.motion ? EyeAt(pixels.y0 + kTileEdge / 2, key, sample) : eye_, seed_, key,
                         sample, &tile, &count->rays, lost);
     }
-    for (int block = 0; block < kBlocks; ++block) Deposit(pixels, block, sample, tile.indirect[block], count);
+    for (int block = 0; block < kBlocks; ++block) {
+      Deposit(pixels, block, sample, tile.indirect[block], tile.mirrored[block], count);
+    }
   }
 
   void TraceIndirectBlock(const Eye& eye, const TilePixels& pixels, int block, int sample,
                           TileSample<kCoat>* tile, PathCount* count) const {
-    tile->places[block] = Look(eye, pixels, block, JitterOf(pixels, block), sample, count);
+    HitPacket hits;
+    tile->places[block] = Look(eye, pixels, block, JitterOf(pixels, block), sample, &hits, count);
+    if (walks_) {
+      // The coat mirrors its light where the pixels look, before the places are those where light comes in.
+      if constexpr (kCoat) {
+        AddGlintPaths(eye, pixels, block, sample, tile, count);
+        tile->mirrored[block] = std::exchange(tile->indirect[block], Lanes3{});
+      }
+      tile->places[block] = Entries(hits, tile->places[block], pixels, block, sample, count);
+    }
     if (options_.shared_paths == 0) AddOwnPaths(eye, pixels, block, sample, tile, count);
-    if constexpr (kCoat) AddGlintPaths(eye, pixels, block, sample, tile, count);
+    if constexpr (kCoat) {
+      if (!walks_) AddGlintPaths(eye, pixels, block, sample, tile, count);
+    }
   }
 
   // Adds a block's sample of indirect light to the frame's sums, but for pixels where it is not finite.
-  void Deposit(const TilePixels& pixels, int block, int sample, const Lanes3& light, PathCount* count) {
+  // mirrored: if it is kept apart.
+  void Deposit(const TilePixels& pixels, int block, int sample, const Lanes3& light, const Lanes3& mirrored,
+               PathCount* count) {
     for (int i = 0; i < kLanes; ++i) {
       if (!pixels.on[block][i]) continue;
       const int x = pixels.X(block, i), y = pixels.Y(block, i);
       const size_t pixel = static_cast<size_t>(y) * view_.valid->width + x;
-      const Vec3f value = light[i];
-      if (value.allFinite()) {
+      const Vec3f value = light[i], apart = mirrored_.empty() ? Vec3f(0, 0, 0) : mirrored[i];
+      if (value.allFinite() && apart.allFinite()) {
         for (int c = 0; c < 3; ++c) indirect_[3 * pixel + c] += value[c];
+        for (int c = 0; c < 3 && !mirrored_.empty(); ++c) mirrored_[3 * pixel + c] += apart[c];
         continue;
       }
       Note({1, x, y, sample}, &count->failure);
@@ -198,6 +241,7 @@ class Tracer {
   }
 
   void AddIndirect(Film* film) const {
+    ImageF& part = walks_ ? film->subsurface : film->indirect;
     ParallelFor(0, view_.valid->height, [&](int64_t y) {
       for (int x = 0; x < view_.valid->width; ++x) {
         const size_t pixel = static_cast<size_t>(y) * view_.valid->width + x;
@@ -206,7 +250,11 @@ class Tracer {
         for (int c = 0; c < 3; ++c) {
           const float mean = static_cast<float>(indirect_[3 * pixel + c] / static_cast<double>(kept));
           film->radiance.data[3 * pixel + c] += mean;
-          if (!film->indirect.empty()) film->indirect.data[3 * pixel + c] = mean;
+          if (!part.empty()) part.data[3 * pixel + c] += mean;
+          if (mirrored_.empty()) continue;
+          const float apart = static_cast<float>(mirrored_[3 * pixel + c] / static_cast<double>(kept));
+          film->radiance.data[3 * pixel + c] += apart;
+          if (!film->indirect.empty()) film->indirect.data[3 * pixel + c] = apart;
         }
       }
     });
@@ -235,7 +283,7 @@ class Tracer {
 
   // The places that a block's pixels see.
   PlacesOf<kCoat> Look(const Eye& eye, const TilePixels& pixels, int block, const SamplerLanes& jitter,
-                       int sample, PathCount* count) const {
+                       int sample, HitPacket* hits, PathCount* count) const {
     Lanes x = pixels.x[block], y = pixels.y[block];
     if (options_.samples > 1) {
       Lanes u, v;
@@ -254,10 +302,9 @@ class Tracer {
     Store3(Rotated(eye.rotation, in_camera), rays.direction);
     Store(Lanes{}, rays.tnear);
     Store(seen ? Broadcast(kFar) : Broadcast(-1), rays.tfar);
-    HitPacket hits;
-    scene_.wall->Intersect(rays, &hits);
+    scene_.wall->Intersect(rays, hits);
     count->rays += Count(seen);
-    return finder_.Find(rays, hits, false);
+    return finder_.Find(rays, *hits, false);
   }
 
   static Lanes3 Rotated(const Mat3<float>& r, const Lanes3& v) {
@@ -278,11 +325,12 @@ class Tracer {
     return origin;
   }
 
-  void AddDirect(const Eye& eye, const PlacesOf<kCoat>& places, LobesOf<kCoat>* direct,
+  // seen: by the camera.
+  void AddDirect(const Eye& eye, const PlacesOf<kCoat>& places, bool seen, LobesOf<kCoat>* direct,
                  PathCount* count) const {
     for (const Guide& guide : eye.guides) {
       LobesOf<kCoat> light = Reflected<kCoat>(guide, IncidenceFrom(guide, places.point), places);
-      if (!guide.at_camera) {
+      if (!(guide.at_camera && seen)) {
         const LanesI asked = Sum(light.Whole()) != 0.0f;
         const LanesI shadowed = Shadowed(*scene_.wall, guide, places, asked);
         count->rays += Count(asked);
@@ -350,8 +398,10 @@ class Tracer {
   const BouncePaths<kCoat> own_paths_;
   const SharedPaths<kCoat> shared_paths_;
   const bool pinhole_;
-  const Eye eye_;                 // at the frame's moment
+  const Eye eye_;  // at the frame's moment
+  std::optional<TissueWalks<kCoat>> walks_;
   std::vector<double> indirect_;  // sums over samples, RGB of each pixel
+  std::vector<double> mirrored_;  // likewise off the coat, where there is tissue below; else in indirect_
   std::once_flag any_lost_;
   std::vector<uint32_t> lost_;  // samples of a pixel that were not finite; empty while there are none
 };

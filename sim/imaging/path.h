@@ -46,7 +46,8 @@ struct View {
 struct Film {
   ImageF radiance;
   ImageF direct, indirect;
-  ImageF glint;  // of direct light on the coat; empty without one
+  ImageF glint;       // of direct light on the coat; empty without one
+  ImageF subsurface;  // light that left the tissue towards the camera; empty without
 };
 
 // A radiance that was not finite: it is left out of its pixel's mean, counted, and the first is named.
@@ -62,7 +63,7 @@ struct PathCount {
 
 // Renders one frame. Randomness is a function of (seed, frame, pixel, sample, dimension). A single sample
 // goes through the pixel's centre, several are spread over its square. The film must be empty or of the
-// camera's size; with_parts asks for direct and indirect light separately. Same bytes for any number of
+// camera's size; with_parts asks for the parts of the radiance as well. Same bytes for any number of
 // threads.
 PathCount RenderFrame(const PathScene& scene, const View& view, const PathOptions& options, uint64_t seed,
                       int frame, bool with_parts, Film* film);

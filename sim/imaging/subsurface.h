@@ -24,6 +24,13 @@
 // Chandrasekhar's function for isotropic scattering: the defaults give 0.23, 0.16, 0.11, that blood alone
 // 0.54, 0.12, 0.10.
 //
+// In a picture the coefficients give the wall's colour. The surface's albedo tells no more than how its
+// texture varies: relative to its palest place, its root dims the light on the way in and on the way out, so
+// that a texture wide against the walks looks as on a Lambertian wall, and finer ones blur. A channel whose
+// albedo is 0 stays black. What the coat mirrors is where it was. Paths from wall to wall walk at every wall;
+// only below a coat the light of other walls leaves where it comes in, as much as an even wall reflects (a
+// bias, by what that light changes over the millimetre of a walk and by the wall's not being even).
+//
 // Three channels share a walk. Its free paths are those of a channel drawn by what each still carries, and
 // all three are weighted by the mean density of the three choices (one-sample multiple importance sampling:
 // Veach 1997, ch. 9; Wilkie et al. 2014, "Hero wavelength spectral sampling"): the sum over the channels

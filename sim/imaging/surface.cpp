@@ -128,6 +128,9 @@ Surface ReadSurface(const ConfigTable& table) {
     surface.vessels->width_mm = vessels->Number("width_mm", surface.vessels->width_mm, {1e-4, 1e6});
     surface.vessels->absorption = vessels->Vector("absorption", surface.vessels->absorption, {0, 50});
   }
+  if (const auto subsurface = table.Optional("subsurface")) {
+    surface.subsurface.emplace(ReadSubsurface(*subsurface));
+  }
   if (const auto coat = table.Optional("coat")) {
     CoatOptions options = ReadCoat(*coat);
     surface.coat.emplace(options);
@@ -202,6 +205,11 @@ Lanes3 AlbedoAt(const Surface& surface, uint64_t seed, const Lanes3& places_mm) 
 
 Vec3f AlbedoAt(const Surface& surface, uint64_t seed, const Vec3f& place_mm) {
   return AlbedoAt(surface, seed, Broadcast(place_mm))[0];
+}
+
+Vec3f PalestAlbedo(const Surface& surface) {
+  const double lift = surface.mottling ? std::exp(surface.mottling->contrast) : 1;
+  return (surface.albedo * lift).cwiseMin(1).cast<float>();
 }
 
 TangentFrame::TangentFrame(const Vec3f& normal) {

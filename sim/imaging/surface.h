@@ -1,5 +1,5 @@
 // What the mucosa does with light: a Lambertian wall whose albedo is a solid texture of place, with blood
-// vessels, under a coat of mucus if there is one (coat.h).
+// vessels, or tissue below such a texture (subsurface.h), under a coat of mucus if there is one (coat.h).
 #pragma once
 
 #include <cstdint>
@@ -10,6 +10,7 @@
 #include "common/math.h"
 #include "common/random.h"
 #include "sim/imaging/coat.h"
+#include "sim/imaging/subsurface.h"
 
 namespace lumen {
 
@@ -31,6 +32,7 @@ struct Surface {
   std::optional<Mottling> mottling;
   std::optional<Vessels> vessels;
   std::optional<Coat> coat;
+  std::optional<Subsurface> subsurface;
   std::optional<Coat> bounced_coat;  // that paths meet after a bounce; none: the same
 };
 
@@ -56,6 +58,9 @@ Lanes3 NoiseGradient(uint64_t seed, const Lanes3& points);
 Lanes3 AlbedoAt(const Surface& surface, uint64_t seed, const Lanes3& places_mm);
 // At one place.
 Vec3f AlbedoAt(const Surface& surface, uint64_t seed, const Vec3f& place_mm);
+
+// What the texture's albedo is at most, RGB.
+Vec3f PalestAlbedo(const Surface& surface);
 
 // Two directions that with a unit normal make right-handed axes (Duff et al. 2017, "Building an orthonormal
 // basis, revisited").
