@@ -52,6 +52,13 @@ TEST_F(EffectsTest, CoatChangesThePictureOnly) {
             (Names{"0001_color.png", "sequence.toml"}));
 }
 
+TEST_F(EffectsTest, SubsurfaceChangesThePictureOnly) {
+  const std::string exact = "truth.exact=[\"glint\", \"albedo\", \"z\", \"normal\", \"flow\"]";
+  const fs::path without = RenderTo("without", {exact});
+  const std::string tissue = "surface.subsurface.scattering_per_mm=[1, 1, 1]";
+  EXPECT_EQ(Differing(without, RenderTo("with", {exact, tissue})), (Names{"0001_color.png", "sequence.toml"}));
+}
+
 // Truth is that of the frame's moment.
 TEST_F(EffectsTest, ShutterChangesThePictureOnly) {
   const std::string exact = "truth.exact=[\"albedo\", \"z\", \"flow\"]";

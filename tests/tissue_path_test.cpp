@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "common/config.h"
 #include "common/mesh.h"
 #include "common/parallel.h"
 #include "common/random.h"
@@ -184,7 +185,7 @@ TEST(TissuePath, IntegratingSphere) {
   stage.world_from_camera.translation() = Vec3d(0.5, -0.3, 1);
   stage.surface.subsurface.emplace(Tissue({0.95, 0.9, 0.5}, {1.5, 1, 2}));
   stage.light.sources = {{Vec3d(0.5, 1, 0), Vec3d::UnitZ(), 0, Vec3d::Constant(100)}};
-  stage.options.samples = 16;
+  stage.options.samples = 8;
   const double flux = 4 * kPi * 100, area = 4 * kPi * kRadius_mm * kRadius_mm;
   for (const int shared_paths : {0, 16}) {
     stage.options.shared_paths = shared_paths;
@@ -294,6 +295,14 @@ TEST(TissuePath, TextureDimsTheTissue) {
     EXPECT_EQ(black.radiance.data[i + 1], 0);
     EXPECT_GT(black.radiance.data[i], 0);
   }
+}
+
+TEST(TissuePath, SceneNamesIt) {
+  const auto read = [](const char* text) { return ReadSurface(Config::Parse(text, "scene.toml").root()); };
+  EXPECT_FALSE(read("").subsurface);
+  const Surface defaults = read("[subsurface]"), other = read("[subsurface]\nabsorption_per_mm = [0, 0, 0]");
+  EXPECT_LT(defaults.subsurface->EvenReflectance().maxCoeff(), 0.3);
+  EXPECT_GT(other.subsurface->EvenReflectance().minCoeff(), 0.99);
 }
 
 TEST(TissuePath, AnyNumberOfThreadsGivesTheSameBytes) {
