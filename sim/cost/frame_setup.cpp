@@ -11,12 +11,20 @@ FrameSetup::FrameSetup(const Scene& scene, const WallMoment& wall, int frame, ui
       camera_(scene.calibration.camera),
       valid_(ValidPixels(scene.calibration)),
       photographer_(scene, valid_, seed) {
+  if (wall.moved) {
+    path_scene_.rest = &scene.geometry.mesh;
+    path_scene_.rest_anchor = Bounds(scene.geometry.mesh).center();
+  }
   if (scene.sensor.shutter) motion_.emplace(*scene.sensor.shutter, scene.world_from_camera, frame);
 }
 
 ImageF FrameSetup::Trace(const PathOptions& options, uint64_t seed, PathCount* count) const {
-  const View view{&camera_, &valid_, scene_.world_from_camera[frame_], &scene_.calibration.light,
-                  motion_ ? &*motion_ : nullptr};
+  const View view{&camera_,
+                  &valid_,
+                  scene_.world_from_camera[frame_],
+                  &scene_.calibration.light,
+                  motion_ ? &*motion_ : nullptr,
+                  scene_.defocus ? &*scene_.defocus : nullptr};
   Film film;
   const PathCount counted = RenderFrame(path_scene_, view, options, seed, frame_, false, &film);
   if (count != nullptr) *count = counted;

@@ -39,6 +39,11 @@ std::vector<Knob> KnobsOf(const Scene& scene) {
         std::min(own.roulette_after, own.bounces),
         [](int n, PathOptions* options) { options->roulette_after = n; }, [](int) { return 1.0; }));
   }
+  if (own.bounces > 0) {
+    knobs.push_back(NumberKnob(
+        "shared_paths", false, own, {0, 8, 16, 32, 64, 128}, own.shared_paths,
+        [](int n, PathOptions* options) { options->shared_paths = n; }, [](int) { return 1.0; }));
+  }
   knobs.push_back(NumberKnob(
       "bounces", true, own, {0, 1, 2, 3, 5, 8, 16}, own.bounces,
       [](int n, PathOptions* options) { options->bounces = n; },
@@ -65,6 +70,7 @@ std::vector<EffectSwitch> SwitchesOf(const Scene& scene) {
          sources[0].position.setZero();
        }},
       {"vignetting", [](Scene* s) { s->calibration.response.vignetting = 0; }},
+      {"defocus", [](Scene* s) { s->defocus.reset(); }},
       {"chromatic_aberration", [](Scene* s) { s->chromatic_aberration.reset(); }},
       {"shutter", [](Scene* s) { s->sensor.shutter.reset(); }},
       {"sensor_noise", [](Scene* s) { s->sensor.noise.reset(); }},
