@@ -61,6 +61,7 @@ std::vector<EffectSwitch> SwitchesOf(const Scene& scene) {
          s->surface.coat.reset();
          s->surface.bounced_coat.reset();
        }},
+      {"subsurface", [](Scene* s) { s->surface.subsurface.reset(); }},
       // One source at the camera that is as strong as all.
       {"offset_guides",
        [](Scene* s) {
