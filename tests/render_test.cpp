@@ -185,7 +185,7 @@ TEST_F(RenderTest, TruthLeavesFramesAlone) {
   }
   std::vector<std::string> names;
   ReadExr(scratch_ / "all" / "exact" / "0001.exr", &names);
-  EXPECT_EQ(names.size(), 5 * 3 + 1 + 1 + 3 + 3 + 3 + 2 + 1 + 2 + 1u);
+  EXPECT_EQ(names.size(), 6 * 3 + 1 + 1 + 3 + 3 + 3 + 2 + 1 + 2 + 1u);
 }
 
 // Nothing of an earlier render is left to be taken for the new one's.

@@ -119,8 +119,8 @@ class BouncePaths {
     return ends;
   }
 
-  // Adds the light that comes to the ends from other walls, times `share`.
-  void AddRest(const Eye& eye, const BounceStart& start, BouncePairs pairs, float share, FarEnds<kCoat>* ends,
+  // Adds the light that comes to the ends from other walls.
+  void AddRest(const Eye& eye, const BounceStart& start, BouncePairs pairs, FarEnds<kCoat>* ends,
                int64_t* rays) const {
     PlacesOf<kCoat> places = Lit(*ends);
     Lanes3 throughput = Broadcast(Vec3f(1, 1, 1)), weight = start.weight, incoming{};
@@ -138,7 +138,6 @@ class BouncePaths {
           wall_, eye, places, Numbers(start, places.alive, pairs.Guide(bounce)), rays);
       incoming = incoming + Select(places.alive, throughput * light.sent, Lanes3{});
     }
-    incoming = incoming * Broadcast(share);
     if constexpr (kCoat) {
       ends->arrivals[1].light = incoming;
     } else {

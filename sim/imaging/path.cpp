@@ -357,7 +357,7 @@ class Tracer {
       start.direction.Set(i, lambert::Sample(places.normal[i], sampler.Pair(kPairs.Direction(1))));
     }
     FarEnds<kCoat> ends = own_paths_.End(eye, start, kPairs, &count->rays);
-    own_paths_.AddRest(eye, start, kPairs, 1, &ends, &count->rays);
+    own_paths_.AddRest(eye, start, kPairs, &ends, &count->rays);
     Lanes3 light = places.albedo * ends.RadianceTo(start.direction * Broadcast(-1));
     if constexpr (kCoat) light = light * places.coat->Transmission(places.lanes(), start.direction);
     tile->indirect[block] = tile->indirect[block] + Select(ends.places.alive, light, Lanes3{});
@@ -385,7 +385,7 @@ class Tracer {
     }
     if (!Any(start.on)) return;
     FarEnds<kCoat> ends = own_paths_.End(eye, start, kPairs, &count->rays);
-    own_paths_.AddRest(eye, start, kPairs, 1, &ends, &count->rays);
+    own_paths_.AddRest(eye, start, kPairs, &ends, &count->rays);
     const Lanes3 light = start.weight * ends.RadianceTo(start.direction * Broadcast(-1));
     tile->indirect[block] = tile->indirect[block] + Select(ends.places.alive, light, Lanes3{});
   }

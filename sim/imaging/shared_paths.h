@@ -8,9 +8,8 @@
 //
 // at most n/K · ρ_i L. A join takes n shadow rays, in coherent packets, and is what costs; so of the K ends
 // only some are joined, chosen with a probability e_k in proportion to their brightness and divided by it
-// (resampled importance sampling: Talbot, Cline and Egbert 2005), and only every kRestEvery-th packet of
-// paths goes on beyond its end. All of it is without bias. Noise is smaller than with a path for each pixel,
-// and alike in neighbouring pixels.
+// (resampled importance sampling: Talbot, Cline and Egbert 2005). All of it is without bias. Noise is smaller
+// than with a path for each pixel, and alike in neighbouring pixels.
 #pragma once
 
 #include <array>
@@ -42,15 +41,13 @@ class SharedPaths {
     if (places.count == 0) return;
     const int packets = (count_ * kPathsPerJoin + kLanes - 1) / kLanes;
     const Sampler tile_sampler(seed, key ^ kTileNumbers, static_cast<uint32_t>(sample));
-    const Vec2f tile_random = tile_sampler.Pair(0);
-    const int rest = static_cast<int>(tile_random[0] * kRestEvery);
     std::vector<Packet> paths(static_cast<size_t>(packets));
     double whole = 0;
     for (int p = 0; p < packets; ++p) {
       Packet& path = paths[static_cast<size_t>(p)];
       const BounceStart start = Start(places, *tile, seed, key, sample, p, packets, path.source);
       path.ends = paths_.End(eye, start, kPairs, rays);
-      if (p % kRestEvery == rest) paths_.AddRest(eye, start, kPairs, float(kRestEvery), &path.ends, rays);
+      paths_.AddRest(eye, start, kPairs, &path.ends, rays);
       path.brightness = Brightness(path.ends, start);
       for (int i = 0; i < kLanes; ++i) {
         if (!path.ends.places.alive[i]) path.brightness[i] = 0;
@@ -64,7 +61,7 @@ class SharedPaths {
     }
     if (!(whole > 0)) return;
     // Systematic sampling: an end is chosen where the sum of the e_k passes an integer.
-    double passed = tile_random[1];
+    double passed = tile_sampler.Pair(0)[0];
     for (Packet& path : paths) {
       for (int i = 0; i < kLanes; ++i) {
         if (path.brightness[i] == 0) continue;
@@ -79,7 +76,7 @@ class SharedPaths {
   }
 
  private:
-  static constexpr int kPathsPerJoin = 8, kRestEvery = 1;
+  static constexpr int kPathsPerJoin = 4;               // least time to a given noise, of 1 to 8
   static constexpr uint64_t kTileNumbers = 1ull << 38;  // apart from its paths'
   static constexpr uint32_t kSourcePair = 0;
   static constexpr BouncePairs kPairs{1};
