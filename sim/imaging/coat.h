@@ -48,7 +48,7 @@ struct CoatOptions {
   double roughness = 0.2;
   double relief_mm = 0.5;
   double relief_height_mm = 0.06;
-  std::optional<double> bounced_roughness;
+  std::optional<double> bounced_roughness = std::nullopt;
 };
 
 // Reads the scene's [surface.coat].
