@@ -56,7 +56,8 @@ TEST_F(EffectsTest, SubsurfaceChangesThePictureOnly) {
   const std::string exact = "truth.exact=[\"glint\", \"albedo\", \"z\", \"normal\", \"flow\"]";
   const fs::path without = RenderTo("without", {exact});
   const std::string tissue = "surface.subsurface.scattering_per_mm=[1, 1, 1]";
-  EXPECT_EQ(Differing(without, RenderTo("with", {exact, tissue})), (Names{"0001_color.png", "sequence.toml"}));
+  EXPECT_EQ(Differing(without, RenderTo("with", {exact, tissue})),
+            (Names{"0001_color.png", "sequence.toml"}));
 }
 
 // Truth is that of the frame's moment.

@@ -13,36 +13,16 @@
 #include "common/parallel.h"
 #include "sim/imaging/surface.h"
 #include "tests/support.h"
+#include "tests/tissue_means.h"
 
 namespace lumen {
 namespace {
 
-// Standard errors that a mean may be off: one in 300,000 estimates is further.
-constexpr double kBound = 4.5;
-
-struct Mean {
-  double sum = 0, squares = 0;
-  int64_t count = 0;
-  void Add(double value) {
-    sum += value;
-    squares += value * value;
-    ++count;
-  }
-  double value() const { return sum / double(count); }
-  double error() const {
-    return std::sqrt(std::max(0.0, squares / double(count) - value() * value()) / double(count));
-  }
-};
-
-void ExpectAgree(const Mean& a, const Mean& b) {
-  EXPECT_LT(std::abs(a.value() - b.value()), kBound * std::hypot(a.error(), b.error()))
-      << a.value() << " ± " << a.error() << " against " << b.value() << " ± " << b.error();
-}
-
-void ExpectMean(const Mean& mean, double expected) {
-  EXPECT_LT(std::abs(mean.value() - expected), kBound * mean.error() + 1e-6)
-      << mean.value() << " ± " << mean.error() << " against " << expected;
-}
+using test::ExpectAgree;
+using test::ExpectMean;
+using test::kBound;
+using test::Mean;
+using test::WithAlbedos;
 
 // A square in the plane z, its normal along ±z.
 void AddSquare(double half_mm, double z, bool up, Mesh* mesh) {
@@ -182,10 +162,6 @@ TEST(Subsurface, ReferenceIsChandrasekharsFunction) {
       EXPECT_NEAR(reference.At(cosine), integral(albedo, cosine), 1e-4) << albedo << " " << cosine;
     }
   }
-}
-
-SubsurfaceOptions WithAlbedos(const Vec3d& albedos, const Vec3d& extinctions) {
-  return {extinctions.cwiseProduct(Vec3d::Ones() - albedos), extinctions.cwiseProduct(albedos)};
 }
 
 // Channels whose free paths are up to 6 times apart share a walk.
@@ -444,67 +420,6 @@ TEST(Subsurface, EndlessTissueLosesWhatDiffusesAway) {
   EXPECT_GT(lost.value(), kBound * lost.error());
 }
 
-// Sum over cells of the squared deviation, less the cells, in standard deviations.
-double ChiSquareDeviation(const std::vector<double>& counts, double expected) {
-  double sum = 0;
-  for (const double count : counts) sum += (count - expected) * (count - expected) / expected;
-  const double freedom = double(counts.size()) - 1;
-  return (sum - freedom) / std::sqrt(2 * freedom);
-}
-
-TEST(Subsurface, FreePathsAreExponential) {
-  const Vec3d extinctions(0.7, 2, 5);
-  const Subsurface tissue(WithAlbedos({0.5, 0.6, 0.7}, extinctions));
-  const int count = 200000, cells = 50;
-  const auto deviation = [&](int channel, double tested) {
-    std::vector<double> found(cells, 0);
-    for (int i = 0; i < count; ++i) {
-      const SampleStream random(3, uint64_t(channel), uint64_t(i));
-      const float path = tissue.FreePath(Vec3f::Unit(channel) * 0.3f, random.Uniform(0), random.Uniform(1));
-      found[std::min(cells - 1, int(cells * -std::expm1(-tested * path)))] += 1;
-    }
-    return ChiSquareDeviation(found, double(count) / cells);
-  };
-  for (int c = 0; c < 3; ++c) {
-    EXPECT_LT(std::abs(deviation(c, extinctions[c])), 5);
-    EXPECT_GT(deviation(c, 1.1 * extinctions[c]), 20);
-  }
-}
-
-// Of a path that is drawn for all channels, each keeps its own exponential: what it carries after collisions
-// within a range of lengths, and after meeting a wall.
-TEST(Subsurface, SharedFreePathsKeepEveryChannelsOwn) {
-  const Vec3d albedos(0.5, 0.6, 0.7), extinctions(0.7, 2, 5);
-  const Subsurface tissue(WithAlbedos(albedos, extinctions));
-  const Vec3f before(0.9f, 0.2f, 0.5f);
-  const double wall = 0.8;
-  Mean early[3], late[3], crossed[3];
-  double most = 0;
-  for (int i = 0; i < 200000; ++i) {
-    const SampleStream random(4, 0, uint64_t(i));
-    const float path = tissue.FreePath(before, random.Uniform(0), random.Uniform(1));
-    Vec3f carried = before;
-    if (path < wall) {
-      tissue.Scatter(path, &carried);
-    } else {
-      tissue.Cross(float(wall), &carried);
-    }
-    most = std::max(most, double(carried.sum()));
-    for (int c = 0; c < 3; ++c) {
-      early[c].Add(path < wall / 2 ? carried[c] : 0);
-      late[c].Add(path >= wall / 2 && path < wall ? carried[c] : 0);
-      crossed[c].Add(path >= wall ? carried[c] : 0);
-    }
-  }
-  for (int c = 0; c < 3; ++c) {
-    const double half = std::exp(-extinctions[c] * wall / 2);
-    ExpectMean(early[c], before[c] * albedos[c] * (1 - half));
-    ExpectMean(late[c], before[c] * albedos[c] * half * (1 - half));
-    ExpectMean(crossed[c], before[c] * half * half);
-  }
-  EXPECT_LE(most, double(before.sum()) * (1 + 1e-6));
-}
-
 TEST(Subsurface, ExtremeTissueGivesFiniteWeights) {
   const Stage cavity(Sphere(20, 30, false), Vec3f::Zero(), Vec3f(0.3f, 0.5f, 0.7f).normalized());
   const Stage ball(Sphere(20, 30, true), {0.2f, 0.3f, 90}, -Vec3f::UnitZ());
@@ -582,9 +497,9 @@ TEST(Subsurface, EveryWalkEndsWhereverItStarts) {
     const RayHit hit = wall.Intersect(eye, down, 0, 1e9f);
     ASSERT_TRUE(hit.hit());
     const float slant = i % 4 == 0 ? 1e-4f : 1.0f;
-    const Vec3f inward = (slant * lambert::Sample(-normal, Vec2f(other.Uniform(3), other.Uniform(4))) +
-                          (1 - slant) * across)
-                             .normalized();
+    const Vec3f inward =
+        (slant * lambert::Sample(-normal, Vec2f(other.Uniform(3), other.Uniform(4))) + (1 - slant) * across)
+            .normalized();
     const WalkExit exit = tissue.Walk(wall, {hit.face, eye + hit.t * down, normal, inward}, random, &rays);
     EXPECT_TRUE(exit.weight.allFinite());
     if (i % 4 != 0) weight.Add(exit.weight[0]);

@@ -16,8 +16,8 @@ MlpShape ColorShape(const FieldOptions& options) {
 }
 
 MlpShape AmbientShape(const FieldOptions& options) {
-  const bool none = options.interreflection == Interreflection::kNone ||
-                    options.reflectance != Reflectance::kLambertian;
+  const bool none =
+      options.interreflection == Interreflection::kNone || options.reflectance != Reflectance::kLambertian;
   if (none) return {0, {}, 0, Activation::kSquareplus};
   return {3, options.ambient_hidden, 1, Activation::kSquareplus};
 }
