@@ -7,6 +7,7 @@
 #include "common/parallel.h"
 #include "common/random.h"
 #include "sim/imaging/path.h"
+#include "tests/path_stage.h"
 
 namespace lumen {
 namespace {
@@ -17,28 +18,9 @@ const Vec3d kGuide(3, 0.5, -0.2);  // from the eye
 constexpr double kSpread = 1.5;
 constexpr double kIntensity = 500;
 
-Mesh Sphere(int rings) {
-  Mesh mesh;
-  for (int i = 0; i <= rings; ++i) {
-    for (int j = 0; j < 2 * rings; ++j) {
-      const double polar = kPi * i / rings, turn = kPi * j / rings;
-      mesh.vertices.push_back(kRadius_mm * Vec3d(std::sin(polar) * std::cos(turn),
-                                                 std::sin(polar) * std::sin(turn), std::cos(polar)));
-    }
-  }
-  for (int i = 0; i < rings; ++i) {
-    for (int j = 0; j < 2 * rings; ++j) {
-      const int a = i * 2 * rings + j, b = i * 2 * rings + (j + 1) % (2 * rings);
-      mesh.faces.push_back({a, b, a + 2 * rings});
-      mesh.faces.push_back({b, b + 2 * rings, a + 2 * rings});
-    }
-  }
-  return mesh;
-}
-
 // A camera inside a coated sphere.
 struct Stage {
-  Mesh mesh = Sphere(100);
+  Mesh mesh = test::Globe(kRadius_mm, 100);
   RayScene wall{mesh};
   std::vector<Vec3d> normals = VertexNormals(mesh);
   Surface surface;

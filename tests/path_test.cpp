@@ -12,9 +12,16 @@
 #include "common/random.h"
 #include "sim/ground_truth.h"
 #include "sim/imaging/offset_origin.h"
+#include "tests/path_stage.h"
 
 namespace lumen {
 namespace {
+
+using test::AddPlate;
+using test::PixelOf;
+
+Mesh Sphere(double radius, int rings) { return test::Globe(radius, rings); }
+Mesh Cylinder(double radius, int rings) { return test::Tube(radius, 100, rings, 2 * rings); }
 
 CameraIntrinsics Pinhole(int width, int height, double focal_px) {
   CameraIntrinsics intrinsics;
@@ -24,45 +31,6 @@ CameraIntrinsics Pinhole(int width, int height, double focal_px) {
   intrinsics.cx = width / 2.0 - 0.27;
   intrinsics.cy = height / 2.0 - 0.61;
   return intrinsics;
-}
-
-// Places of a surface over the grid (along × around), joined to triangles.
-Mesh Lathe(int along, int around, const std::function<Vec3d(double, double)>& place) {
-  Mesh mesh;
-  for (int i = 0; i <= along; ++i) {
-    for (int j = 0; j < around; ++j) mesh.vertices.push_back(place(double(i) / along, 2 * kPi * j / around));
-  }
-  for (int i = 0; i < along; ++i) {
-    for (int j = 0; j < around; ++j) {
-      const int a = i * around + j, b = i * around + (j + 1) % around;
-      mesh.faces.push_back({a, b, a + around});
-      mesh.faces.push_back({b, b + around, a + around});
-    }
-  }
-  return mesh;
-}
-
-Mesh Sphere(double radius, int rings) {
-  return Lathe(rings, 2 * rings, [=](double along, double angle) {
-    const double polar = kPi * along;
-    return Vec3d(radius * std::sin(polar) * std::cos(angle), radius * std::sin(polar) * std::sin(angle),
-                 radius * std::cos(polar));
-  });
-}
-
-Mesh Cylinder(double radius, int rings) {
-  return Lathe(rings, 2 * rings, [=](double along, double angle) {
-    return Vec3d(radius * std::cos(angle), radius * std::sin(angle), 200 * along - 100);
-  });
-}
-
-void AddPlate(Mesh* mesh, double x0, double x1, double y0, double y1, double z) {
-  const int first = static_cast<int>(mesh->vertices.size());
-  for (const Vec3d& corner : {Vec3d(x0, y0, z), Vec3d(x1, y0, z), Vec3d(x1, y1, z), Vec3d(x0, y1, z)}) {
-    mesh->vertices.push_back(corner);
-  }
-  mesh->faces.push_back({first, first + 1, first + 2});
-  mesh->faces.push_back({first, first + 2, first + 3});
 }
 
 Light OneGuide(const Vec3d& position = Vec3d::Zero(), double spread = 2.77, double intensity = 500) {
@@ -121,10 +89,6 @@ Vec3d DirectRadiance(const Stage& stage, const Light& light, const Vec3d& place,
   }
   if (envelope) *envelope = largest;
   return sum;
-}
-
-Vec3d PixelOf(const ImageF& image, int x, int y) {
-  return Eigen::Map<const Vec3f>(image.Pixel(x, y)).cast<double>();
 }
 
 // Against the closed form at the place and with the normal of the very triangle: 1e-5 of the radiance, and

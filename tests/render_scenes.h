@@ -3,8 +3,10 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "common/files.h"
+#include "common/image.h"
 #include "tests/support.h"
 
 namespace lumen::test {
@@ -64,6 +66,23 @@ inline std::filesystem::path WriteScene(const ScratchFolder& scratch, const std:
   const std::filesystem::path file = scratch / "scene.toml";
   WriteFile(file, text);
   return file;
+}
+
+// The channels of an exact file that belong to `name`.
+inline ImageF Exact(const std::filesystem::path& file, const std::string& name) {
+  std::vector<std::string> names;
+  const ImageF all = ReadExr(file, &names);
+  std::vector<int> channels;
+  for (size_t i = 0; i < names.size(); ++i) {
+    if (names[i] == name || names[i].starts_with(name + ".")) channels.push_back(static_cast<int>(i));
+  }
+  ImageF image(all.width, all.height, static_cast<int>(channels.size()));
+  for (size_t pixel = 0; pixel < size_t(all.width) * all.height; ++pixel) {
+    for (size_t c = 0; c < channels.size(); ++c) {
+      image.data[pixel * channels.size() + c] = all.data[pixel * all.channels + channels[c]];
+    }
+  }
+  return image;
 }
 
 }  // namespace lumen::test

@@ -17,6 +17,8 @@
 namespace lumen {
 namespace {
 
+using test::Exact;
+
 namespace fs = std::filesystem;
 using test::ErrorOf;
 using test::WriteScene;
@@ -53,23 +55,6 @@ class RenderTest : public testing::Test {
   }
   test::ScratchFolder scratch_;
 };
-
-// The channels of an exact file that belong to `name`.
-ImageF Exact(const fs::path& file, const std::string& name) {
-  std::vector<std::string> names;
-  const ImageF all = ReadExr(file, &names);
-  std::vector<int> channels;
-  for (size_t i = 0; i < names.size(); ++i) {
-    if (names[i] == name || names[i].starts_with(name + ".")) channels.push_back(static_cast<int>(i));
-  }
-  ImageF image(all.width, all.height, static_cast<int>(channels.size()));
-  for (size_t pixel = 0; pixel < size_t(all.width) * all.height; ++pixel) {
-    for (size_t c = 0; c < channels.size(); ++c) {
-      image.data[pixel * channels.size() + c] = all.data[pixel * all.channels + channels[c]];
-    }
-  }
-  return image;
-}
 
 TEST_F(RenderTest, WritesASequenceThatReadsBack) {
   const RenderResult result = RenderTo("sequence", {"truth.exact=[\"z\", \"normal\", \"flow\"]"});

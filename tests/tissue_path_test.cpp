@@ -9,6 +9,8 @@
 #include "common/parallel.h"
 #include "common/random.h"
 #include "sim/imaging/path.h"
+#include "tests/path_stage.h"
+#include "tests/tissue_means.h"
 
 namespace lumen {
 namespace {
@@ -46,29 +48,6 @@ Mesh Plate(double thickness_mm = 0) {
   return mesh;
 }
 
-Mesh Cavity(double radius_mm, int rings) {
-  Mesh mesh;
-  for (int i = 0; i <= rings; ++i) {
-    for (int j = 0; j < 2 * rings; ++j) {
-      const double polar = kPi * i / rings, turn = kPi * j / rings;
-      mesh.vertices.push_back(radius_mm * Vec3d(std::sin(polar) * std::cos(turn),
-                                                std::sin(polar) * std::sin(turn), std::cos(polar)));
-    }
-  }
-  for (int i = 0; i < rings; ++i) {
-    for (int j = 0; j < 2 * rings; ++j) {
-      const int a = i * 2 * rings + j, b = i * 2 * rings + (j + 1) % (2 * rings);
-      mesh.faces.push_back({a, b, a + 2 * rings});
-      mesh.faces.push_back({b, b + 2 * rings, a + 2 * rings});
-    }
-  }
-  return mesh;
-}
-
-SubsurfaceOptions Tissue(const Vec3d& albedos, const Vec3d& extinctions) {
-  return {extinctions.cwiseProduct(Vec3d::Ones() - albedos), extinctions.cwiseProduct(albedos)};
-}
-
 // A camera 20 mm above a plate, looking down, or in a cavity.
 struct Stage {
   Mesh mesh;
@@ -89,7 +68,7 @@ struct Stage {
     world_from_camera.linear() = Eigen::AngleAxisd(kPi, Vec3d::UnitX()).toRotationMatrix();
     world_from_camera.translation() = Vec3d(3, 2, 20);
     options.samples = 32;
-    surface.subsurface.emplace(Tissue({0.9, 0.6, 0.3}, {1, 2, 0.7}));
+    surface.subsurface.emplace(test::WithAlbedos({0.9, 0.6, 0.3}, {1, 2, 0.7}));
   }
   // So far off that its light comes to all places alike, irradiance 1 on a facing patch. In camera axes.
   void LightFrom(const Vec3d& direction) {
@@ -181,9 +160,9 @@ TEST(TissuePath, LightComesThroughAFold) {
 TEST(TissuePath, IntegratingSphere) {
   constexpr double kRadius_mm = 6;
   constexpr int kBounces = 4, kFrames = 12;
-  Stage stage(Cavity(kRadius_mm, 40), 16, 16);
+  Stage stage(test::Globe(kRadius_mm, 40), 16, 16);
   stage.world_from_camera.translation() = Vec3d(0.5, -0.3, 1);
-  stage.surface.subsurface.emplace(Tissue({0.95, 0.9, 0.5}, {1.5, 1, 2}));
+  stage.surface.subsurface.emplace(test::WithAlbedos({0.95, 0.9, 0.5}, {1.5, 1, 2}));
   stage.light.sources = {{Vec3d(0.5, 1, 0), Vec3d::UnitZ(), 0, Vec3d::Constant(100)}};
   stage.options.samples = 8;
   const double flux = 4 * kPi * 100, area = 4 * kPi * kRadius_mm * kRadius_mm;
@@ -219,7 +198,7 @@ TEST(TissuePath, IntegratingSphere) {
 }
 
 Stage Coated() {
-  Stage stage(Cavity(15, 40), 24, 16);
+  Stage stage(test::Globe(15, 40), 24, 16);
   stage.world_from_camera.translation() = Vec3d(1, -2, 3);
   stage.light.sources = {{Vec3d(2, 1, 0), Vec3d::UnitZ(), 1, Vec3d::Constant(500)}};
   stage.surface.coat.emplace(CoatOptions{});

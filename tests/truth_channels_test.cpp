@@ -9,6 +9,7 @@
 #include "sim/face_visibility.h"
 #include "sim/render.h"
 #include "sim/surface_maps.h"
+#include "tests/path_stage.h"
 #include "tests/render_scenes.h"
 #include "tests/support.h"
 
@@ -17,32 +18,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
+using test::Exact;
+using test::PixelOf;
+
 constexpr uint64_t kSeed = 4;
 constexpr double kRadius_mm = 20;
-
-// A sphere of 2·rings² triangles around the origin.
-Mesh Sphere(int rings) {
-  Mesh mesh;
-  for (int i = 0; i <= rings; ++i) {
-    for (int j = 0; j < 2 * rings; ++j) {
-      const double polar = kPi * i / rings, turn = kPi * j / rings;
-      mesh.vertices.push_back(kRadius_mm * Vec3d(std::sin(polar) * std::cos(turn),
-                                                 std::sin(polar) * std::sin(turn), std::cos(polar)));
-    }
-  }
-  for (int i = 0; i < rings; ++i) {
-    for (int j = 0; j < 2 * rings; ++j) {
-      const int a = i * 2 * rings + j, b = i * 2 * rings + (j + 1) % (2 * rings);
-      mesh.faces.push_back({a, b, a + 2 * rings});
-      mesh.faces.push_back({b, b + 2 * rings, a + 2 * rings});
-    }
-  }
-  return mesh;
-}
-
-Vec3d PixelOf(const ImageF& image, int x, int y) {
-  return Eigen::Map<const Vec3f>(image.Pixel(x, y)).cast<double>();
-}
 
 // A camera inside a sphere, and its truth with smooth normals.
 struct SphereView {
@@ -53,7 +33,7 @@ struct SphereView {
   Pose world_from_camera = Pose(Eigen::Translation3d(4, -6, 3) * Eigen::AngleAxisd(1.2, Vec3d::UnitX()));
   FrameTruth truth;
 
-  explicit SphereView(int rings) : mesh(Sphere(rings)) {
+  explicit SphereView(int rings) : mesh(test::Globe(kRadius_mm, rings)) {
     TruthExtras extras;
     extras.vertex_normals = &vertex_normals;
     truth = ComputeTruth(wall, camera, Image8(60, 48, 1, 255), world_from_camera, nullptr, extras);
@@ -130,22 +110,6 @@ TEST(TruthChannels, ShadingNormalFollowsTheRelief) {
   EXPECT_GT(tilt / count, 0.05);  // the relief is there to be noticed
 }
 
-ImageF Exact(const fs::path& file, const std::string& name) {
-  std::vector<std::string> names;
-  const ImageF all = ReadExr(file, &names);
-  std::vector<int> channels;
-  for (size_t i = 0; i < names.size(); ++i) {
-    if (names[i] == name || names[i].starts_with(name + ".")) channels.push_back(static_cast<int>(i));
-  }
-  ImageF image(all.width, all.height, static_cast<int>(channels.size()));
-  for (size_t pixel = 0; pixel < size_t(all.width) * all.height; ++pixel) {
-    for (size_t c = 0; c < channels.size(); ++c) {
-      image.data[pixel * channels.size() + c] = all.data[pixel * all.channels + channels[c]];
-    }
-  }
-  return image;
-}
-
 class TruthChannelsTest : public testing::Test {
  protected:
   fs::path RenderTo(const std::string& name, const std::string& exact) {
@@ -193,7 +157,7 @@ TEST_F(TruthChannelsTest, FlowNextIsTheReprojection) {
 
 // Flow forth from one view is flow back from it to the same other view.
 TEST(TruthChannels, FlowNextMirrorsFlow) {
-  const Mesh mesh = Sphere(30);
+  const Mesh mesh = test::Globe(kRadius_mm, 30);
   const RayScene wall(mesh);
   const Camera<double> camera(Resized(C3vdIntrinsics(), 60, 48));
   const Image8 valid(60, 48, 1, 255);

@@ -6,9 +6,8 @@
 //   origin o,   direction (focus · w − o)/|focus · w − o|.
 //
 //   aperture_mm  0.3   diameter of the entrance pupil, 0…2; 0 is a pinhole
-//   focus_mm     10    from the camera's centre, along the ray: what is sharp lies on a sphere, because a
-//   plane
-//                      would not be met by a fisheye's rays at 90° and more
+//   focus_mm     10    from the camera's centre, along the ray: what is sharp lies on a sphere, because
+//                      a plane would not be met by a fisheye's rays at 90° and more
 //
 // At a distance d along the ray the samples fill a disc of diameter aperture·|1 − d/focus|, parallel to the
 // aperture; seen from the centre that is aperture·|1/d − 1/focus| rad on the axis, times the cosine of the
