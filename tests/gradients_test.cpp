@@ -3,39 +3,17 @@
 
 #include <cmath>
 
-#include "common/random.h"
 #include "recon/surface/volume.h"
 #include "recon/training/ray_loss.h"
+#include "tests/finite_difference.h"
 
 namespace lumen {
 namespace {
 
-double Random(uint64_t& state) { return 2 * UniformDouble(Mix64(state++)) - 1; }
-
-void Fill(Panel<double>* panel, uint64_t& state, double scale = 1) {
-  for (int tile = 0; tile < panel->tiles(); ++tile)
-    for (int i = 0; i < panel->rows() * kTile; ++i) panel->Tile(tile)[i] = scale * Random(state);
-}
-
-double Dot(const Panel<double>& a, const Panel<double>& b) {
-  double sum = 0;
-  for (int tile = 0; tile < a.tiles(); ++tile)
-    for (int i = 0; i < a.rows() * kTile; ++i) sum += a.Tile(tile)[i] * b.Tile(tile)[i];
-  return sum;
-}
-
-// Central difference of f at x, where f has size about 1: steps of 1e-5 leave 1e-10 of truncation (times the
-// third derivative) and 1e-11 of rounding.
-template <class F>
-double Difference(F f, double* x, double step = 1e-5) {
-  const double kept = *x;
-  *x = kept + step;
-  const double above = f();
-  *x = kept - step;
-  const double below = f();
-  *x = kept;
-  return (above - below) / (2 * step);
-}
+using test::Difference;
+using test::Dot;
+using test::Fill;
+using test::Random;
 
 class MlpGradients : public testing::TestWithParam<MlpShape> {};
 
@@ -61,12 +39,14 @@ TEST_P(MlpGradients, MatchFiniteDifferences) {
   loss();
   mlp.BackwardSecondOrder(parameters.data(), input, by_output, by_gradient, &pass, gradient.data(),
                           &input_delta);
+  // Softplus bends within 1/β = 0.01: the smaller step leaves 1e-14 β³ of truncation and 1e-8 of rounding.
+  const double step = shape.activation == Activation::kSoftplus ? 1e-7 : 1e-5;
   for (size_t i = 0; i < parameters.size(); i += 3) {
-    const double expected = Difference(loss, &parameters[i]);
+    const double expected = Difference(loss, &parameters[i], step);
     EXPECT_NEAR(gradient[i], expected, 1e-6 * std::max(1.0, std::abs(expected))) << "parameter " << i;
   }
   for (int i = 0; i < shape.inputs; ++i) {
-    const double expected = Difference(loss, &input.At(i, 70));
+    const double expected = Difference(loss, &input.At(i, 70), step);
     EXPECT_NEAR(input_delta.At(i, 70), expected, 1e-6 * std::max(1.0, std::abs(expected))) << "input " << i;
   }
 }
@@ -75,7 +55,10 @@ INSTANTIATE_TEST_SUITE_P(Shapes, MlpGradients,
                          testing::Values(MlpShape{19, {32}, 16, Activation::kSquareplus},
                                          MlpShape{5, {7, 6, 5}, 3, Activation::kSquareplus},
                                          MlpShape{3, {}, 2, Activation::kSquareplus},
-                                         MlpShape{1, {1}, 1, Activation::kSquareplus}));
+                                         MlpShape{1, {1}, 1, Activation::kSquareplus},
+                                         MlpShape{5, {7, 9, 6}, 3, Activation::kSquareplus, 2},
+                                         MlpShape{3, {5}, 2, Activation::kSquareplus, 1},
+                                         MlpShape{9, {20, 20, 20, 20}, 6, Activation::kSoftplus, 2}));
 
 // ReLU has no second order but must have a right first one.
 TEST(Mlp, ReluFirstOrderMatchesFiniteDifferences) {
@@ -233,6 +216,7 @@ TEST(Shading, DerivativesMatchFiniteDifferences) {
 struct LookOfWall {
   Reflectance reflectance;
   Interreflection interreflection;
+  bool as_paper = false;  // frequencies, softplus, a skip and the sphere that the network starts as
 };
 class RayLossGradient : public testing::TestWithParam<LookOfWall> {};
 
@@ -248,6 +232,16 @@ TEST_P(RayLossGradient, MatchesFiniteDifferences) {
   options.sdf_hidden = {9, 8};
   options.color_hidden = {10};
   options.features = 5;
+  if (GetParam().as_paper) {
+    options.grid.levels = 0;
+    options.place_octaves = 2;
+    options.direction_octaves = 2;
+    options.sdf_hidden = {20, 22, 18};
+    options.sdf_activation = Activation::kSoftplus;
+    options.sdf_skip = 2;
+    options.initial.shape = InitialShape::kSphere;
+    options.unit_mm = 15;
+  }
   Pose pose = Pose::Identity();
   const InitialSurface initial(options.initial, {pose}, Vec3d::Zero());
   const Field<double> field(options, initial, kBox);
@@ -289,12 +283,13 @@ TEST_P(RayLossGradient, MatchesFiniteDifferences) {
     return terms.Sum();
   };
   std::vector<double> gradient;
-  double gain_gradient = 0;
+  double gain_gradient = 0, by_log_sharpness = 0;
   auto analytic = [&] {
     gradient.assign(field.parameter_count(), 0.0);
     const LossTerms terms = ray_loss.Evaluate(parameters.data(), batch, lights, log_gain, settings,
                                               gradient.data() + field.grid_size(), &(gain_gradient = 0));
     for (int l = 0; l < field.grid().levels(); ++l) ray_loss.GridBackward(l, gradient.data());
+    by_log_sharpness = terms.by_log_sharpness;
     EXPECT_EQ(terms.active_samples, 72);
     EXPECT_GT(terms.photometric, 0.01);
   };
@@ -311,6 +306,17 @@ TEST_P(RayLossGradient, MatchesFiniteDifferences) {
   for (size_t i = field.grid_size(); i < parameters.size(); ++i) compare(i);
   EXPECT_GT(compared, 200);
   EXPECT_GT(largest, 1e-2);
+  auto of_log_sharpness = [&, log_sharpness = std::log(settings.sharpness)]() mutable {
+    auto by = [&] {
+      settings.sharpness = std::exp(log_sharpness);
+      return loss();
+    };
+    return Difference(by, &log_sharpness);
+  };
+  const double kept = settings.sharpness;
+  EXPECT_NEAR(by_log_sharpness, of_log_sharpness(), 1e-7);
+  EXPECT_GT(std::abs(by_log_sharpness), 1e-5);
+  settings.sharpness = kept;
   if (GetParam().reflectance != Reflectance::kUnlit) {
     EXPECT_NEAR(gain_gradient, Difference(loss, &log_gain[0]), 1e-7);
   }
@@ -332,7 +338,9 @@ INSTANTIATE_TEST_SUITE_P(Looks, RayLossGradient,
                          testing::Values(LookOfWall{Reflectance::kLambertian, Interreflection::kNone},
                                          LookOfWall{Reflectance::kLambertian, Interreflection::kMean},
                                          LookOfWall{Reflectance::kFree, Interreflection::kNone},
-                                         LookOfWall{Reflectance::kUnlit, Interreflection::kNone}));
+                                         LookOfWall{Reflectance::kUnlit, Interreflection::kNone},
+                                         LookOfWall{Reflectance::kFree, Interreflection::kNone, true},
+                                         LookOfWall{Reflectance::kUnlit, Interreflection::kNone, true}));
 
 }  // namespace
 }  // namespace lumen

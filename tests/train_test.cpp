@@ -11,30 +11,13 @@
 #include "common/parallel.h"
 #include "common/progress.h"
 #include "recon/training/checkpoint.h"
-#include "sim/render.h"
-#include "tests/support.h"
+#include "tests/small_sequence.h"
 
 namespace lumen {
 namespace {
 
 using test::ScratchFolder;
-
-// Six small frames of the default scene, rendered once for all tests.
-const Sequence& SmallSequence() {
-  static const ScratchFolder folder;
-  static const Sequence sequence = [] {
-    SetQuiet(true);
-    const Scene scene = ReadScene(LUMEN_SOURCE_FOLDER "/scenes/colon.toml",
-                                  {"camera.width=90", "camera.height=72", "trajectory.frames=6",
-                                   "path.samples=1", "geometry.tolerance_mm=0.3", "truth.c3vd=false"},
-                                  0);
-    RenderOptions options;
-    options.folder = folder / "sequence";
-    Render(scene, options);
-    return ReadSequence(options.folder);
-  }();
-  return sequence;
-}
+using test::SmallSequence;
 
 std::vector<std::string> SmallSettings(int iterations) {
   return {"schedule.iterations=" + std::to_string(iterations), "sampling.rays=96", "extract.cell_mm=3"};

@@ -12,14 +12,16 @@ constexpr float kEpsilon = 1e-15f;
 
 }  // namespace
 
-AdamStep::AdamStep(double rate, int64_t step)
+AdamStep::AdamStep(double rate, int64_t step, double beta2)
     : rate(static_cast<float>(rate)),
       first_correction(static_cast<float>(1 / (1 - std::pow(kAdamBeta1, static_cast<double>(step))))),
-      second_correction(static_cast<float>(1 / (1 - std::pow(kAdamBeta2, static_cast<double>(step))))) {}
+      second_correction(static_cast<float>(1 / (1 - std::pow(beta2, static_cast<double>(step))))),
+      beta2(static_cast<float>(beta2)) {}
 
 void AdamUpdate(const AdamStep& step, size_t count, float* __restrict parameter, float* __restrict gradient,
                 float* __restrict first, float* __restrict second) {
-  constexpr float b1 = kAdamBeta1, b2 = kAdamBeta2;
+  constexpr float b1 = kAdamBeta1;
+  const float b2 = step.beta2;
   const float rate = step.rate * step.first_correction;
   for (size_t i = 0; i < count; ++i) {
     const float g = gradient[i];

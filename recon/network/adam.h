@@ -10,11 +10,12 @@ struct AdamStep {
   float rate;
   // 1/(1 − β₁ᵗ) and 1/(1 − β₂ᵗ) of step t = 1, 2, …
   float first_correction, second_correction;
+  float beta2;
 
-  AdamStep(double rate, int64_t step);
+  AdamStep(double rate, int64_t step, double beta2);
 };
 
-inline constexpr double kAdamBeta1 = 0.9, kAdamBeta2 = 0.99;
+inline constexpr double kAdamBeta1 = 0.9;
 
 // Moves parameters against their gradient and clears the gradient.
 void AdamUpdate(const AdamStep& step, size_t count, float* parameter, float* gradient, float* first,

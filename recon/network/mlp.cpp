@@ -2,42 +2,25 @@
 
 #include <cmath>
 
+#include "common/math.h"
 #include "common/random.h"
 #include "recon/network/product.h"
 
 namespace lumen {
 namespace {
 
-constexpr double kSquareplusBend = 0.01;
+// What the joined numbers of a skip are multiplied by, so that their sum of squares stays as it is (NeuS).
+constexpr double kSkipScale = 0.70710678118654752440;
 
-// In place: a becomes σ(a); slope and bend may be null.
+// to = scale · from, `count` rows of one tile.
 template <class T>
-void Activate(Activation activation, int count, T* a, T* slope, T* bend) {
-  if (activation == Activation::kRelu) {
-    if (slope)
-      for (int i = 0; i < count; ++i) slope[i] = a[i] > 0 ? T(1) : T(0);
-    if (bend) std::fill(bend, bend + count, T(0));
-    for (int i = 0; i < count; ++i) a[i] = a[i] > 0 ? a[i] : T(0);
-    return;
-  }
-  constexpr T b = T(kSquareplusBend);
-  if (!slope) {
-    for (int i = 0; i < count; ++i) a[i] = T(0.5) * (a[i] + std::sqrt(a[i] * a[i] + b));
-  } else if (!bend) {
-    for (int i = 0; i < count; ++i) {
-      const T root = std::sqrt(a[i] * a[i] + b);
-      slope[i] = T(0.5) + T(0.5) * a[i] / root;
-      a[i] = T(0.5) * (a[i] + root);
-    }
-  } else {
-    for (int i = 0; i < count; ++i) {
-      const T root = std::sqrt(a[i] * a[i] + b);
-      const T inverse = 1 / root;
-      slope[i] = T(0.5) + T(0.5) * a[i] * inverse;
-      bend[i] = T(0.5) * b * inverse * inverse * inverse;
-      a[i] = T(0.5) * (a[i] + root);
-    }
-  }
+void ScaleRows(int rows, T scale, const T* from, T* to) {
+  for (int i = 0; i < rows * kTile; ++i) to[i] = scale * from[i];
+}
+
+template <class T>
+void AddScaledRows(int rows, T scale, const T* from, T* to) {
+  for (int i = 0; i < rows * kTile; ++i) to[i] += scale * from[i];
 }
 
 }  // namespace
@@ -49,6 +32,7 @@ Mlp<T>::Mlp(const MlpShape& shape) : shape_(shape) {
   widths.push_back(shape.outputs);
   for (size_t l = 0; l + 1 < widths.size(); ++l) {
     Layer layer{widths[l], widths[l + 1], parameter_count_, 0};
+    if (shape.skip > 0 && static_cast<int>(l) + 1 == shape.skip) layer.outputs -= shape.inputs;
     layer.bias = layer.weight + size_t(layer.inputs) * layer.outputs;
     parameter_count_ = layer.bias + layer.outputs;
     layers_.push_back(layer);
@@ -68,6 +52,38 @@ void Mlp<T>::Initialise(uint64_t seed, double last_layer_scale, T* parameters) c
 }
 
 template <class T>
+void Mlp<T>::InitialiseAsSphere(uint64_t seed, double radius, int place_begin, T* parameters) const {
+  const int last = layer_count() - 1;
+  for (int l = 0; l <= last; ++l) {
+    const Layer& layer = layers_[l];
+    std::fill(parameters + layer.bias, parameters + layer.bias + layer.outputs, T(0));
+    for (int o = 0; o < layer.outputs; ++o) {
+      for (int i = 0; i < layer.inputs; ++i) {
+        const size_t at = layer.weight + size_t(o) * layer.inputs + i;
+        const double gauss = std::sqrt(-2 * std::log(1 - UniformDouble(RandomBits(seed, at, 0)))) *
+                             std::cos(2 * kPi * UniformDouble(RandomBits(seed, at, 1)));
+        // Which of the network's inputs this is, if it is one.
+        const int input = l == 0 ? i : JoinsInput(l) ? i - layers_[l - 1].outputs : -1;
+        const bool is_place = input >= place_begin && input < place_begin + 3;
+        double weight = gauss * std::sqrt(2.0 / layer.outputs);
+        if (l == 0 && !is_place) weight = 0;
+        if (l > 0 && input >= 0 && !is_place) weight = 0;
+        if (l == last) weight = -std::sqrt(kPi / layer.inputs) + 1e-4 * gauss;
+        parameters[at] = static_cast<T>(weight);
+      }
+    }
+  }
+  for (int o = 0; o < layers_[last].outputs; ++o) parameters[layers_[last].bias + o] = static_cast<T>(radius);
+}
+
+template <class T>
+std::vector<typename Mlp<T>::Matrix> Mlp<T>::matrices() const {
+  std::vector<Matrix> all;
+  for (const Layer& layer : layers_) all.push_back({layer.weight, layer.outputs, layer.inputs});
+  return all;
+}
+
+template <class T>
 void Mlp<T>::Forward(const T* parameters, const Panel<T>& input, int outputs, Keep keep, Pass* pass) const {
   const int tiles = input.tiles();
   const bool with_slopes = keep != Keep::kNothing;
@@ -77,7 +93,7 @@ void Mlp<T>::Forward(const T* parameters, const Panel<T>& input, int outputs, Ke
   pass->bend.resize(layer_count() - 1);
   for (int l = 0; l < layer_count(); ++l) {
     const bool last = l + 1 == layer_count();
-    pass->value[l].Resize(last ? outputs : layers_[l].outputs, tiles);
+    pass->value[l].Resize(last ? outputs : layers_[l + 1].inputs, tiles);
     if (last) break;
     if (with_slopes) pass->slope[l].Resize(layers_[l].outputs, tiles);
     if (with_bends) pass->bend[l].Resize(layers_[l].outputs, tiles);
@@ -87,11 +103,18 @@ void Mlp<T>::Forward(const T* parameters, const Panel<T>& input, int outputs, Ke
     for (int l = 0; l < layer_count(); ++l) {
       const Layer& layer = layers_[l];
       T* y = pass->value[l].Tile(tile);
-      Multiply(parameters + layer.weight, parameters + layer.bias, pass->value[l].rows(), layer.inputs, x, y);
-      if (l + 1 < layer_count()) {
-        Activate(shape_.activation, layer.outputs * kTile, y,
-                 with_slopes ? pass->slope[l].Tile(tile) : nullptr,
-                 with_bends ? pass->bend[l].Tile(tile) : nullptr);
+      const bool last = l + 1 == layer_count();
+      Multiply(parameters + layer.weight, parameters + layer.bias, last ? outputs : layer.outputs,
+               layer.inputs, x, y);
+      if (!last) {
+        T* slope = with_slopes ? pass->slope[l].Tile(tile) : nullptr;
+        T* bend = with_bends ? pass->bend[l].Tile(tile) : nullptr;
+        Activate(shape_.activation, layer.outputs * kTile, y, slope, bend);
+        if (JoinsInput(l + 1)) {
+          for (T* rows : {y, slope, bend})
+            if (rows) ScaleRows(layer.outputs, T(kSkipScale), rows, rows);
+          ScaleRows(shape_.inputs, T(kSkipScale), input.Tile(tile), y + layer.outputs * kTile);
+        }
       }
       x = y;
     }
@@ -105,7 +128,7 @@ void Mlp<T>::InputGradient(const T* parameters, Pass* pass) const {
   pass->pulled.resize(last);
   pass->adjoint.resize(last);
   for (int l = 0; l < last; ++l) {
-    pass->pulled[l].Resize(layers_[l].outputs, tiles);
+    pass->pulled[l].Resize(layers_[l + 1].inputs, tiles);
     pass->adjoint[l].Resize(layers_[l].outputs, tiles);
   }
   pass->input_gradient.Resize(shape_.inputs, tiles);
@@ -123,7 +146,13 @@ void Mlp<T>::InputGradient(const T* parameters, Pass* pass) const {
       if (l == 0) break;
       const T* slope = pass->slope[l - 1].Tile(tile);
       T* adjoint = pass->adjoint[l - 1].Tile(tile);
-      for (int i = 0; i < layer.inputs * kTile; ++i) adjoint[i] = slope[i] * pulled[i];
+      const int count = layers_[l - 1].outputs * kTile;
+      for (int i = 0; i < count; ++i) adjoint[i] = slope[i] * pulled[i];
+    }
+    if (shape_.skip > 0) {
+      AddScaledRows(shape_.inputs, T(kSkipScale),
+                    pass->pulled[shape_.skip - 1].Row(tile, layers_[shape_.skip - 1].outputs),
+                    pass->input_gradient.Tile(tile));
     }
   }
 }
@@ -135,7 +164,7 @@ void Mlp<T>::PushTangent(const T* parameters, const Panel<T>& direction, Pass* p
   pass->tangent.resize(hidden);
   for (int l = 0; l < hidden; ++l) {
     pass->pushed[l].Resize(layers_[l].outputs, direction.tiles());
-    pass->tangent[l].Resize(layers_[l].outputs, direction.tiles());
+    pass->tangent[l].Resize(layers_[l + 1].inputs, direction.tiles());
   }
   for (int tile = 0; tile < direction.tiles(); ++tile) {
     const T* x = direction.Tile(tile);
@@ -146,6 +175,8 @@ void Mlp<T>::PushTangent(const T* parameters, const Panel<T>& direction, Pass* p
       Multiply<T>(parameters + layer.weight, nullptr, layer.outputs, layer.inputs, x, pushed);
       const T* slope = pass->slope[l].Tile(tile);
       for (int i = 0; i < layer.outputs * kTile; ++i) tangent[i] = slope[i] * pushed[i];
+      if (JoinsInput(l + 1))
+        ScaleRows(shape_.inputs, T(kSkipScale), direction.Tile(tile), tangent + layer.outputs * kTile);
       x = tangent;
     }
   }
@@ -159,6 +190,7 @@ void Mlp<T>::BackwardImpl(const T* parameters, const Panel<T>& input, const Pane
   pass->delta.resize(last);
   for (int l = 0; l < last; ++l) pass->delta[l].Resize(layers_[l].outputs, tiles);
   if (input_delta) input_delta->Resize(shape_.inputs, tiles);
+  if (shape_.skip > 0) pass->joined_delta.Resize(layers_[shape_.skip].inputs, 1);
   for (int tile = 0; tile < tiles; ++tile) {
     for (int l = last; l >= 0; --l) {
       const Layer& layer = layers_[l];
@@ -166,10 +198,12 @@ void Mlp<T>::BackwardImpl(const T* parameters, const Panel<T>& input, const Pane
       const T* delta = l == last ? output_delta.Tile(tile) : pass->delta[l].Tile(tile);
       T* below = l > 0 ? pass->delta[l - 1].Tile(tile) : input_delta->Tile(tile);
       const int outputs = l == last ? output_delta.rows() : layer.outputs;
-      MultiplyTransposed(parameters + layer.weight, outputs, layer.inputs, delta, below);
+      T* joined = JoinsInput(l) ? pass->joined_delta.Tile(0) : below;
+      MultiplyTransposed(parameters + layer.weight, outputs, layer.inputs, delta, joined);
       if (l == 0) break;
       const T* slope = pass->slope[l - 1].Tile(tile);
-      const int count = layer.inputs * kTile;
+      const int count = layers_[l - 1].outputs * kTile;
+      if (joined != below) std::copy(joined, joined + count, below);
       if (direction) {
         const T* bend = pass->bend[l - 1].Tile(tile);
         const T* pushed = pass->pushed[l - 1].Tile(tile);
@@ -178,6 +212,10 @@ void Mlp<T>::BackwardImpl(const T* parameters, const Panel<T>& input, const Pane
       } else {
         for (int i = 0; i < count; ++i) below[i] *= slope[i];
       }
+    }
+    if (shape_.skip > 0 && input_delta) {
+      AddScaledRows(shape_.inputs, T(kSkipScale), pass->joined_delta.Row(0, layers_[shape_.skip - 1].outputs),
+                    input_delta->Tile(tile));
     }
   }
   for (int l = 0; l <= last; ++l) {

@@ -11,20 +11,19 @@
 #include <cstdint>
 #include <vector>
 
+#include "recon/network/activation.h"
 #include "recon/network/panel.h"
 
 namespace lumen {
-
-enum class Activation {
-  kRelu,
-  kSquareplus,  // (a + √(a² + b)) / 2, b = 0.01: ReLU with a bend of width 0.1 (Barron 2021)
-};
 
 struct MlpShape {
   int inputs = 0;
   std::vector<int> hidden;
   int outputs = 0;
   Activation activation = Activation::kRelu;
+  // The layer (counted from 0) that sees the network's input once more: (h, x)/√2. The layer before it is
+  // narrower by as many, so that hidden[skip − 1] counts both. 0 = none.
+  int skip = 0;
 };
 
 // T = float, or double for reference. Holds the shape only; parameters are the caller's: W_1, c_1, W_2, c_2,
@@ -38,10 +37,21 @@ class Mlp {
   size_t parameter_count() const { return parameter_count_; }
   // Weights uniform in ±√(6/inputs) (He 2015), biases 0; the last layer's times `last_layer_scale`.
   void Initialise(uint64_t seed, double last_layer_scale, T* parameters) const;
+  // NeuS's geometric start (Atzmon and Lipman 2020) turned inside out: the outputs are about radius − |x|,
+  // where x are the inputs from place_begin on, three of them; the others count for nothing yet.
+  void InitialiseAsSphere(uint64_t seed, double radius, int place_begin, T* parameters) const;
+  // Where the weights stand among the parameters.
+  struct Matrix {
+    size_t begin;
+    int rows, columns;
+  };
+  std::vector<Matrix> matrices() const;
 
   // What the passes over one batch leave for each other. Reuse it: it keeps its memory.
   struct Pass {
-    std::vector<Panel<T>> value;    // h_l; value[L−1] is the output (l counted from 0 here and below)
+    // h_l; value[L−1] is the output (l counted from 0 here and below). Where a layer joins the input to it,
+    // value, pulled and tangent hold the rows of both.
+    std::vector<Panel<T>> value;
     std::vector<Panel<T>> slope;    // σ′(a_l), hidden layers
     std::vector<Panel<T>> bend;     // σ″(a_l), hidden layers, if asked for
     std::vector<Panel<T>> pulled;   // B_l
@@ -50,6 +60,7 @@ class Mlp {
     std::vector<Panel<T>> tangent;  // φ_l
     std::vector<Panel<T>> delta;    // ∂loss/∂a_l
     Panel<T> input_gradient;        // q
+    Panel<T> joined_delta;          // ∂loss/∂(h, x)/√2 of one tile, where the shape has a skip
   };
 
   // What a forward pass keeps for the passes that may follow.
@@ -78,6 +89,7 @@ class Mlp {
     size_t weight, bias;  // offsets in the parameters
   };
   int layer_count() const { return static_cast<int>(layers_.size()); }
+  bool JoinsInput(int layer) const { return layer > 0 && layer == shape_.skip; }
   void PushTangent(const T* parameters, const Panel<T>& direction, Pass* pass) const;
   void BackwardImpl(const T* parameters, const Panel<T>& input, const Panel<T>& output_delta,
                     const Panel<T>* direction, Pass* pass, T* gradient, Panel<T>* input_delta) const;

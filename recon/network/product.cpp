@@ -46,12 +46,20 @@ void MultiplyStrided(const T* weight, size_t row_stride, size_t column_stride, c
   }
 }
 
+// Tiles of both panels that go through the second-level cache together.
+constexpr size_t kGroupBytes = size_t(1) << 20;
+
+struct TileRange {
+  int begin, end;
+};
+
 template <class T, int kOutputs, int kInputs>
-void AccumulateBlock(const Panel<T>& y, int first_output, const Panel<T>& x, int first_input, T* gradient) {
+void AccumulateBlock(const Panel<T>& y, int first_output, const Panel<T>& x, int first_input, TileRange tiles,
+                     T* gradient) {
   using Vector = typename Lanes<T>::Vector;
   constexpr int kVectors = Lanes<T>::kPerRow;
   Vector sum[kOutputs][kInputs] = {};
-  for (int tile = 0; tile < y.tiles(); ++tile) {
+  for (int tile = tiles.begin; tile < tiles.end; ++tile) {
     const Vector* a = reinterpret_cast<const Vector*>(y.Row(tile, first_output));
     const Vector* b = reinterpret_cast<const Vector*>(x.Row(tile, first_input));
     for (int v = 0; v < kVectors; ++v)
@@ -63,6 +71,24 @@ void AccumulateBlock(const Panel<T>& y, int first_output, const Panel<T>& x, int
       T total = 0;
       for (int lane = 0; lane < Lanes<T>::kCount; ++lane) total += sum[o][i][lane];
       gradient[size_t(o) * x.rows() + i] += total;
+    }
+  }
+}
+
+template <class T>
+void AccumulateGroup(const Panel<T>& y, const Panel<T>& x, TileRange tiles, T* gradient) {
+  const int outputs = y.rows();
+  const int inputs = x.rows();
+  for (int o = 0; o < outputs; o += 4) {
+    for (int i = 0; i < inputs; i += 4) {
+      T* block = gradient + size_t(o) * inputs + i;
+      if (o + 4 <= outputs && i + 4 <= inputs) {
+        AccumulateBlock<T, 4, 4>(y, o, x, i, tiles, block);
+      } else {
+        for (int oo = o; oo < std::min(o + 4, outputs); ++oo)
+          for (int ii = i; ii < std::min(i + 4, inputs); ++ii)
+            AccumulateBlock<T, 1, 1>(y, oo, x, ii, tiles, gradient + size_t(oo) * inputs + ii);
+      }
     }
   }
 }
@@ -83,17 +109,10 @@ template <class T>
 void AccumulateOuter(const Panel<T>& y, const Panel<T>& x, T* gradient, T* bias_gradient) {
   const int outputs = y.rows();
   const int inputs = x.rows();
-  for (int o = 0; o < outputs; o += 4) {
-    for (int i = 0; i < inputs; i += 4) {
-      T* block = gradient + size_t(o) * inputs + i;
-      if (o + 4 <= outputs && i + 4 <= inputs) {
-        AccumulateBlock<T, 4, 4>(y, o, x, i, block);
-      } else {
-        for (int oo = o; oo < std::min(o + 4, outputs); ++oo)
-          for (int ii = i; ii < std::min(i + 4, inputs); ++ii)
-            AccumulateBlock<T, 1, 1>(y, oo, x, ii, gradient + size_t(oo) * inputs + ii);
-      }
-    }
+  const size_t tile_bytes = size_t(outputs + inputs) * kTile * sizeof(T);
+  const int group = static_cast<int>(std::max<size_t>(1, kGroupBytes / tile_bytes));
+  for (int begin = 0; begin < y.tiles(); begin += group) {
+    AccumulateGroup(y, x, {begin, std::min(begin + group, y.tiles())}, gradient);
   }
   if (!bias_gradient) return;
   for (int tile = 0; tile < y.tiles(); ++tile) {

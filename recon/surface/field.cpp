@@ -6,12 +6,15 @@ namespace lumen {
 namespace {
 
 MlpShape SdfShape(const FieldOptions& options) {
-  return {options.grid.levels * Grid<float>::kFeatures + 3, options.sdf_hidden, 1 + options.features,
-          Activation::kSquareplus};
+  const int encoded =
+      options.grid.levels * Grid<float>::kFeatures + Frequency<float>(options.place_octaves).outputs();
+  return {encoded + 3, options.sdf_hidden, 1 + options.features, options.sdf_activation, options.sdf_skip};
 }
 
 MlpShape ColorShape(const FieldOptions& options) {
-  const int view = options.reflectance == Reflectance::kLambertian ? 0 : 6;
+  const int view = options.reflectance == Reflectance::kLambertian
+                       ? 0
+                       : 6 + Frequency<float>(options.direction_octaves).outputs();
   return {options.features + 3 + view, options.color_hidden, 3, Activation::kRelu};
 }
 
@@ -39,6 +42,8 @@ Field<T>::Field(const FieldOptions& options, const InitialSurface& initial, cons
       initial_(initial),
       box_(box),
       grid_(options.grid, box),
+      place_frequency_(options.place_octaves),
+      direction_frequency_(options.direction_octaves),
       sdf_(SdfShape(options)),
       color_(ColorShape(options)),
       ambient_(AmbientShape(options)),
@@ -47,7 +52,11 @@ Field<T>::Field(const FieldOptions& options, const InitialSurface& initial, cons
 template <class T>
 void Field<T>::Initialise(uint64_t seed, T* parameters) const {
   grid_.Initialise(seed * 3, parameters);
-  sdf_.Initialise(seed * 3 + 1, kSdfStart, parameters + grid_size());
+  if (initial_.is_learnt()) {
+    sdf_.InitialiseAsSphere(seed * 3 + 1, initial_.radius_mm() / unit_, encoded(), parameters + grid_size());
+  } else {
+    sdf_.Initialise(seed * 3 + 1, kSdfStart, parameters + grid_size());
+  }
   color_.Initialise(seed * 3 + 2, kColorStart, parameters + grid_size() + sdf_.parameter_count());
   if (!has_ambient()) return;
   T* ambient = parameters + grid_size() + sdf_.parameter_count() + color_.parameter_count();
@@ -56,20 +65,38 @@ void Field<T>::Initialise(uint64_t seed, T* parameters) const {
 }
 
 template <class T>
+WeightNorm<T> Field<T>::Normalisation() const {
+  if (!options_.weight_norm) return {};
+  WeightNorm<T> norm(parameter_count());
+  for (const auto& matrix : sdf_.matrices())
+    norm.Add(grid_size() + matrix.begin, matrix.rows, matrix.columns);
+  for (const auto& matrix : color_.matrices())
+    norm.Add(grid_size() + sdf_.parameter_count() + matrix.begin, matrix.rows, matrix.columns);
+  return norm;
+}
+
+template <class T>
+void Field<T>::StartFromInitial(const T* positions, T* value, T* gradient) const {
+  if (!initial_.is_learnt()) return initial_.Evaluate<T>(positions, value, gradient);
+  std::fill(value, value + kTile, T(0));
+  if (gradient) std::fill(gradient, gradient + 3 * kTile, T(0));
+}
+
+template <class T>
 void Field<T>::FillInput(const T* parameters, const Panel<T>& positions, Panel<T>* jacobian,
                          Panel<T>* input) const {
-  const int encoded = grid_.outputs();
-  input->Resize(encoded + 3, positions.tiles());
+  input->Resize(encoded() + 3, positions.tiles());
   if (jacobian) {
-    jacobian->Resize(3 * encoded, positions.tiles());
+    jacobian->Resize(3 * grid_.outputs(), positions.tiles());
     grid_.EncodeWithJacobian(parameters, positions, input, jacobian);
   } else {
     grid_.Encode(parameters, positions, input);
   }
   for (int tile = 0; tile < positions.tiles(); ++tile) {
     const T* x = positions.Tile(tile);
-    T* out = input->Row(tile, encoded);
+    T* out = input->Row(tile, encoded());
     for (int i = 0; i < 3 * kTile; ++i) out[i] = x[i] / unit_;
+    place_frequency_.Encode(out, input->Row(tile, grid_.outputs()));
   }
 }
 
@@ -104,7 +131,7 @@ void Field<T>::Value(const T* parameters, ValuePass* pass) const {
   pass->value.Resize(1, tiles);
   for (int tile = 0; tile < tiles; ++tile) {
     T* f = pass->value.Row(tile, 0);
-    initial_.Evaluate<T>(pass->positions.Tile(tile), f, nullptr);
+    StartFromInitial(pass->positions.Tile(tile), f, nullptr);
     const T* out = pass->sdf.value.back().Row(tile, 0);
     for (int s = 0; s < kTile; ++s) f[s] += unit_ * out[s];
   }
@@ -114,7 +141,7 @@ void Field<T>::Value(const T* parameters, ValuePass* pass) const {
 template <class T>
 void Field<T>::Surface(const T* parameters, SurfacePass* pass) const {
   const int tiles = pass->positions.tiles();
-  const int encoded = grid_.outputs();
+  const int from_grid = grid_.outputs();
   FillInput(parameters, pass->positions, &pass->jacobian, &pass->input);
   sdf_.Forward(parameters + grid_size(), pass->input, 1 + options_.features, Mlp<T>::Keep::kBends,
                &pass->sdf);
@@ -124,19 +151,23 @@ void Field<T>::Surface(const T* parameters, SurfacePass* pass) const {
   pass->free.Resize(1, tiles);
   for (int tile = 0; tile < tiles; ++tile) {
     T* f = pass->value.Row(tile, 0);
-    initial_.Evaluate<T>(pass->positions.Tile(tile), f, pass->gradient.Tile(tile));
+    StartFromInitial(pass->positions.Tile(tile), f, pass->gradient.Tile(tile));
     const T* out = pass->sdf.value.back().Row(tile, 0);
     for (int s = 0; s < kTile; ++s) f[s] += unit_ * out[s];
     for (int d = 0; d < 3; ++d) {
       T* g = pass->gradient.Row(tile, d);
-      const T* by_place = pass->sdf.input_gradient.Row(tile, encoded + d);
+      const T* by_place = pass->sdf.input_gradient.Row(tile, encoded() + d);
       for (int s = 0; s < kTile; ++s) g[s] += by_place[s];
-      for (int r = 0; r < encoded; ++r) {
+      for (int r = 0; r < from_grid; ++r) {
         const T* q = pass->sdf.input_gradient.Row(tile, r);
-        const T* slope = pass->jacobian.Row(tile, d * encoded + r);
+        const T* slope = pass->jacobian.Row(tile, d * from_grid + r);
         for (int s = 0; s < kTile; ++s) g[s] += unit_ * q[s] * slope[s];
       }
     }
+    // Of place over unit, times unit: 1.
+    place_frequency_.AddGradient(pass->input.Row(tile, from_grid),
+                                 pass->sdf.input_gradient.Row(tile, from_grid), T(1),
+                                 pass->gradient.Tile(tile));
   }
   CutOff(pass->positions, &pass->value, &pass->gradient, &pass->free);
 }
@@ -150,20 +181,21 @@ void Field<T>::Color(const T* parameters, SurfacePass* pass) const {
     T* in = pass->color_input.Tile(tile);
     const T* feature = pass->sdf.value.back().Row(tile, 1);
     std::copy(feature, feature + features * kTile, in);
-    const T* place = pass->input.Row(tile, grid_.outputs());
+    const T* place = pass->input.Row(tile, encoded());
     std::copy(place, place + 3 * kTile, in + features * kTile);
     if (!sees_view()) continue;
     const T* normal = pass->normal.Tile(tile);
     std::copy(normal, normal + 3 * kTile, in + (features + 3) * kTile);
     const T* direction = pass->directions.Tile(tile);
     std::copy(direction, direction + 3 * kTile, in + (features + 6) * kTile);
+    direction_frequency_.Encode(direction, in + (features + 9) * kTile);
   }
   color_.Forward(parameters + grid_size() + sdf_.parameter_count(), pass->color_input, 3,
                  Mlp<T>::Keep::kSlopes, &pass->color);
   if (!has_ambient()) return;
   pass->ambient_input.Resize(3, tiles);
   for (int tile = 0; tile < tiles; ++tile) {
-    const T* place = pass->input.Row(tile, grid_.outputs());
+    const T* place = pass->input.Row(tile, encoded());
     std::copy(place, place + 3 * kTile, pass->ambient_input.Tile(tile));
   }
   ambient_.Forward(parameters + grid_size() + sdf_.parameter_count() + color_.parameter_count(),
@@ -190,10 +222,10 @@ void Field<T>::ColorBackward(const T* parameters, SurfacePass* pass, T* network_
 template <class T>
 void Field<T>::SurfaceBackward(const T* parameters, SurfacePass* pass, T* network_gradient) const {
   const int tiles = pass->positions.tiles();
-  const int encoded = grid_.outputs();
+  const int from_grid = grid_.outputs();
   const int features = options_.features;
   pass->output_delta.Resize(1 + features, tiles);
-  pass->direction.Resize(encoded + 3, tiles);
+  pass->direction.Resize(encoded() + 3, tiles);
   pass->scaled_direction.Resize(3, tiles);
   for (int tile = 0; tile < tiles; ++tile) {
     const T* own = pass->free.Row(tile, 0);
@@ -204,7 +236,7 @@ void Field<T>::SurfaceBackward(const T* parameters, SurfacePass* pass, T* networ
     std::copy(feature_delta, feature_delta + features * kTile, pass->output_delta.Row(tile, 1));
     for (int d = 0; d < 3; ++d) {
       const T* u = pass->gradient_delta.Row(tile, d);
-      T* by_place = pass->direction.Row(tile, encoded + d);
+      T* by_place = pass->direction.Row(tile, encoded() + d);
       T* scaled = pass->scaled_direction.Row(tile, d);
       for (int s = 0; s < kTile; ++s) {
         by_place[s] = u[s] * own[s];
@@ -212,13 +244,15 @@ void Field<T>::SurfaceBackward(const T* parameters, SurfacePass* pass, T* networ
       }
     }
     const T* u = pass->scaled_direction.Tile(tile);
-    for (int r = 0; r < encoded; ++r) {
+    for (int r = 0; r < from_grid; ++r) {
       const T* jx = pass->jacobian.Row(tile, r);
-      const T* jy = pass->jacobian.Row(tile, encoded + r);
-      const T* jz = pass->jacobian.Row(tile, 2 * encoded + r);
+      const T* jy = pass->jacobian.Row(tile, from_grid + r);
+      const T* jz = pass->jacobian.Row(tile, 2 * from_grid + r);
       T* v = pass->direction.Row(tile, r);
       for (int s = 0; s < kTile; ++s) v[s] = jx[s] * u[s] + jy[s] * u[kTile + s] + jz[s] * u[2 * kTile + s];
     }
+    place_frequency_.Push(pass->input.Row(tile, from_grid), pass->direction.Row(tile, encoded()),
+                          pass->direction.Row(tile, from_grid));
   }
   sdf_.BackwardSecondOrder(parameters + grid_size(), pass->input, pass->output_delta, pass->direction,
                            &pass->sdf, network_gradient, &pass->input_delta);

@@ -1,6 +1,7 @@
 // The neural surface: a signed distance (positive in the lumen, negative in the wall) and what the surface
-// looks like, as functions of place. Signed distance = initial surface + unit · network(grid encoding,
-// place), cut off by the distance to the bounds, so that every ray ends.
+// looks like, as functions of place. Signed distance = initial surface + unit · network(encoded place,
+// place), cut off by the distance to the bounds, so that every ray ends. Place is encoded by a grid, by
+// frequencies, or by both.
 //
 // All positions are in mm, relative to the field's origin, in panels of 3 rows.
 #pragma once
@@ -8,8 +9,10 @@
 #include <cstdint>
 #include <vector>
 
+#include "recon/network/frequency.h"
 #include "recon/network/grid.h"
 #include "recon/network/mlp.h"
+#include "recon/network/weight_norm.h"
 #include "recon/surface/initial_surface.h"
 
 namespace lumen {
@@ -28,9 +31,14 @@ enum class Interreflection {
 };
 
 struct FieldOptions {
-  GridOptions grid;
+  GridOptions grid;           // no levels: none
+  int place_octaves = 0;      // of the frequency encoding of place
+  int direction_octaves = 0;  // of the ray's direction, for networks that see it
   InitialSurfaceOptions initial;
   std::vector<int> sdf_hidden = {32};
+  Activation sdf_activation = Activation::kSquareplus;
+  int sdf_skip = 0;          // see MlpShape
+  bool weight_norm = false;  // of the distance and the colour network
   std::vector<int> color_hidden = {32, 32};
   int features = 15;  // numbers that the distance network hands to the colour network
   double unit_mm = 68;
@@ -55,6 +63,8 @@ class Field {
   const Eigen::AlignedBox3d& box() const { return box_; }
   const FieldOptions& options() const { return options_; }
   void Initialise(uint64_t seed, T* parameters) const;
+  // Between these parameters and what is learnt of them.
+  WeightNorm<T> Normalisation() const;
   // Where the biases of the colour network's three outputs are.
   size_t color_bias_begin() const {
     return grid_size() + sdf_.parameter_count() + color_.parameter_count() - 3;
@@ -104,6 +114,10 @@ class Field {
 
  private:
   bool sees_view() const { return options_.reflectance != Reflectance::kLambertian; }
+  // Rows of the distance network's input before the three of place.
+  int encoded() const { return grid_.outputs() + place_frequency_.outputs(); }
+  // The base that the network's output is added to, and its gradient unless null.
+  void StartFromInitial(const T* positions, T* value, T* gradient) const;
   void FillInput(const T* parameters, const Panel<T>& positions, Panel<T>* jacobian, Panel<T>* input) const;
   void CutOff(const Panel<T>& positions, Panel<T>* value, Panel<T>* gradient, Panel<T>* free) const;
 
@@ -111,6 +125,7 @@ class Field {
   InitialSurface initial_;
   Eigen::AlignedBox3d box_;
   Grid<T> grid_;
+  Frequency<T> place_frequency_, direction_frequency_;
   Mlp<T> sdf_;
   Mlp<T> color_;
   Mlp<T> ambient_;  // of place alone: what comes from all over the lumen is smooth

@@ -16,7 +16,16 @@ double DistanceToSegment(const Vec3d& point, const Vec3d& start, const Vec3d& sp
 
 InitialSurface::InitialSurface(const InitialSurfaceOptions& options,
                                const std::vector<Pose>& world_from_camera, const Vec3d& origin)
-    : radius_mm_(options.radius_mm) {
+    : is_learnt_(options.shape == InitialShape::kSphere), radius_mm_(options.radius_mm) {
+  if (is_learnt_) {
+    double farthest = 0;
+    for (const Pose& pose : world_from_camera)
+      farthest = std::max(farthest, (pose.translation() - origin).norm());
+    radius_mm_ += farthest;
+    starts_.push_back(Vec3d::Zero());
+    spans_.push_back(Vec3d::Zero());
+    return;
+  }
   auto distance = [&](const Vec3d& point) {
     double nearest = std::numeric_limits<double>::infinity();
     for (size_t i = 0; i < starts_.size(); ++i) {

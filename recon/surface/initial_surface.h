@@ -1,6 +1,6 @@
-// The surface that training starts from: a tube around the camera's path that reaches ahead of it. The
-// network learns what the real wall adds to it. All cameras are inside, where the signed distance is
-// positive.
+// The surface that training starts from: a tube around the camera's path that reaches ahead of it, the
+// network learning what the real wall adds to it; or a sphere around all cameras, which the network is itself
+// at its start, as in NeuS. All cameras are inside, where the signed distance is positive.
 #pragma once
 
 #include <vector>
@@ -10,9 +10,12 @@
 
 namespace lumen {
 
+enum class InitialShape { kTube, kSphere };
+
 struct InitialSurfaceOptions {
-  double radius_mm = 24;
-  double reach_mm = 55;  // how far the tube goes on in each camera's viewing direction
+  InitialShape shape = InitialShape::kTube;
+  double radius_mm = 24;  // of the tube; how far around the cameras the sphere reaches at least
+  double reach_mm = 55;   // how far a tube goes on in each camera's viewing direction
 };
 
 // radius − distance to the nearest of a set of segments.
@@ -23,6 +26,10 @@ class InitialSurface {
   InitialSurface(const InitialSurfaceOptions& options, const std::vector<Pose>& world_from_camera,
                  const Vec3d& origin);
 
+  // Whether it is the network's start and nothing is added to it.
+  bool is_learnt() const { return is_learnt_; }
+  // Of the tube; of the sphere around the origin.
+  double radius_mm() const { return radius_mm_; }
   size_t segments() const { return starts_.size(); }
 
   // Signed distance of the samples of one tile, mm; gradient (3 rows, null if not wanted): unit, into the
@@ -34,6 +41,7 @@ class InitialSurface {
   std::vector<Vec3d> Spine(double step_mm) const;
 
  private:
+  bool is_learnt_;
   double radius_mm_;
   std::vector<Vec3d> starts_, spans_;  // mm
 };

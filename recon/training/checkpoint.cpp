@@ -8,7 +8,7 @@
 namespace lumen {
 namespace {
 
-constexpr char kMagic[8] = {'l', 'u', 'm', 'e', 'n', 'c', 'k', '2'};
+constexpr char kMagic[8] = {'l', 'u', 'm', 'e', 'n', 'c', 'k', '3'};
 
 // FNV-1a, 64 bits (Fowler, Noll, Vo).
 uint64_t Checksum(std::string_view bytes) {
@@ -75,6 +75,7 @@ void Fields(Archive&& value, State& state) {
   value(state.seconds);
   value(state.skipped_steps);
   value(state.first_skipped_step);
+  value(state.log_sharpness);
 }
 template <class Archive, class State>
 void Arrays(Archive&& array, State& state) {

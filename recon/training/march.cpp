@@ -14,31 +14,7 @@ constexpr int kSecantSteps = 3;
 // along the ray than its width, but by no more than five times is it followed.
 constexpr float kShallowest = 0.2f;
 
-// Distance at which a ray leaves the box.
-float ExitDistance(const Eigen::AlignedBox3d& box, const Vec3f& origin, const Vec3f& direction) {
-  float exit = std::numeric_limits<float>::max();
-  for (int d = 0; d < 3; ++d) {
-    if (direction[d] == 0) continue;
-    const double wall = direction[d] > 0 ? box.max()[d] : box.min()[d];
-    exit = std::min(exit, (static_cast<float>(wall) - origin[d]) / direction[d]);
-  }
-  return exit;
-}
-
 }  // namespace
-
-void Marcher::Look(const float* parameters, const RayBatch<float>& batch,
-                   const std::vector<float>& distance) {
-  const int count = static_cast<int>(distance.size());
-  const int rays = static_cast<int>(batch.rays.size());
-  pass_.positions.Resize(3, TilesFor(count));
-  for (int i = 0; i < TilesFor(count) * kTile; ++i) {
-    const int k = std::min(i, count - 1);
-    const auto& ray = batch.rays[k % rays];
-    for (int d = 0; d < 3; ++d) pass_.positions.At(d, i) = ray.origin[d] + distance[k] * ray.direction[d];
-  }
-  field_->Value(parameters, &pass_);
-}
 
 void Marcher::FindCrossings(const float* parameters, const TrainOptions::Sampling& options, uint64_t key,
                             const RayBatch<float>& batch) {
@@ -46,9 +22,7 @@ void Marcher::FindCrossings(const float* parameters, const TrainOptions::Samplin
   far_.resize(rays);
   look_.resize(size_t(rays) * options.coarse);
   for (int r = 0; r < rays; ++r) {
-    // A little beyond the box, where the signed distance is negative for certain.
-    far_[r] = std::max(1.001f * ExitDistance(field_->box(), batch.rays[r].origin, batch.rays[r].direction),
-                       2 * kNearest_mm);
+    far_[r] = FarthestSample(field_->box(), batch.rays[r].origin, batch.rays[r].direction);
     const float jitter = UniformFloat(RandomBits(key, r, 0));
     for (int k = 0; k < options.coarse; ++k) {
       // Denser near the camera, where folds are seen thin; the last look-up is at the far end itself.
@@ -56,7 +30,7 @@ void Marcher::FindCrossings(const float* parameters, const TrainOptions::Samplin
       look_[size_t(k) * rays + r] = kNearest_mm + (far_[r] - kNearest_mm) * u * std::sqrt(u);
     }
   }
-  Look(parameters, batch, look_);
+  LookAlongRays(*field_, parameters, batch, look_, &pass_);
   crossings_.resize(rays);
   for (int r = 0; r < rays; ++r) {
     int k = 0;
@@ -73,7 +47,7 @@ void Marcher::FindCrossings(const float* parameters, const TrainOptions::Samplin
       look_[r] = fall > 0 ? c.inside + (c.outside - c.inside) * (c.inside_value / fall) : c.inside;
       look_[r] = std::clamp(look_[r], c.inside, c.outside);
     }
-    Look(parameters, batch, look_);
+    LookAlongRays(*field_, parameters, batch, look_, &pass_);
     for (int r = 0; r < rays; ++r) {
       Crossing& c = crossings_[r];
       const float value = pass_.value.At(0, r);

@@ -11,19 +11,77 @@ namespace {
 
 struct Preset {
   const char* name;
-  const char* text;  // what differs from the defaults of TrainOptions
+  std::vector<const char*> texts;  // what differs from the defaults of TrainOptions, a later one on top
 };
 
-constexpr Preset kPresets[] = {
-    {"fast", ""},
-    {"neus", R"(
+// The baseline: pixels as they are, and no light.
+constexpr const char* kUnlit = R"(
 [network]
 reflectance = "unlit"
 [loss]
 albedo = 0.0
-)"},
-};
+)";
 
+// NeuS's published configuration for scenes without masks (Wang et al. 2021), its unit being 68 mm. Warm-up:
+// 5,000 of 300,000 iterations. Sharpness: from 20 a unit on; its rounds from 64 a unit on. All samples are
+// shaded, as NeuS does.
+constexpr const char* kPaper = R"(
+[grid]
+levels = 0
+[network]
+place_octaves = 6
+direction_octaves = 4
+sdf_hidden = [256, 256, 256, 256, 256, 256, 256, 256]
+sdf_activation = "softplus"
+sdf_skip = 4
+color_hidden = [256, 256, 256, 256]
+features = 256
+weight_norm = true
+unit_mm = 68.0
+reflectance = "free"
+interreflection = "none"
+[initial]
+shape = "sphere"
+[sampling]
+rays = 512
+sampler = "importance"
+uniform = 64
+rounds = 4
+round = 16
+round_sharpness_per_mm = 0.9412
+weight_threshold = 0.0
+[loss]
+eikonal = 0.1
+[schedule]
+iterations = 300000
+learning_rate = 5e-4
+learning_rate_final = 0.05
+decay = "cosine"
+warm_up = 0.016667
+adam_beta2 = 0.999
+sharpness_start_per_mm = 0.294
+sharpness_rate = 10.0
+)";
+
+const std::vector<Preset>& Presets() {
+  static const std::vector<Preset> presets = {
+      {"fast", {}}, {"paper", {kPaper}}, {"neus", {kUnlit}}, {"neus_paper", {kPaper, kUnlit}}};
+  return presets;
+}
+
+// One of an enumeration's names, in its order.
+template <class Enum>
+void ReadChoice(const ConfigTable& table, const char* key, const std::vector<std::string>& names,
+                Enum* value) {
+  const std::string name = table.Choice(key, names[static_cast<size_t>(*value)], names);
+  for (size_t i = 0; i < names.size(); ++i)
+    if (name == names[i]) *value = static_cast<Enum>(i);
+}
+
+const std::vector<std::string> kActivationNames = {"relu", "squareplus", "softplus"};
+const std::vector<std::string> kShapeNames = {"tube", "sphere"};
+const std::vector<std::string> kSamplerNames = {"guided", "importance"};
+const std::vector<std::string> kDecayNames = {"exponential", "cosine"};
 const char* const kReflectanceNames[] = {"lambertian", "free", "unlit"};
 const char* const kInterreflectionNames[] = {"none", "mean"};
 
@@ -39,7 +97,7 @@ std::vector<int> Widths(const ConfigTable& table, const std::string& key, const 
 
 void ReadField(const ConfigTable& root, FieldOptions* field) {
   if (const auto grid = root.Optional("grid")) {
-    field->grid.levels = static_cast<int>(grid->Integer("levels", field->grid.levels, {1, 32}));
+    field->grid.levels = static_cast<int>(grid->Integer("levels", field->grid.levels, {0, 32}));
     field->grid.coarsest_cell_mm =
         grid->Number("coarsest_cell_mm", field->grid.coarsest_cell_mm, {1e-3, 1e3});
     field->grid.finest_cell_mm = grid->Number("finest_cell_mm", field->grid.finest_cell_mm, {1e-3, 1e3});
@@ -49,6 +107,12 @@ void ReadField(const ConfigTable& root, FieldOptions* field) {
   if (const auto network = root.Optional("network")) {
     field->sdf_hidden = Widths(*network, "sdf_hidden", field->sdf_hidden);
     field->color_hidden = Widths(*network, "color_hidden", field->color_hidden);
+    field->place_octaves = static_cast<int>(network->Integer("place_octaves", field->place_octaves, {0, 16}));
+    field->direction_octaves =
+        static_cast<int>(network->Integer("direction_octaves", field->direction_octaves, {0, 16}));
+    ReadChoice(*network, "sdf_activation", kActivationNames, &field->sdf_activation);
+    field->sdf_skip = static_cast<int>(network->Integer("sdf_skip", field->sdf_skip, {0, 64}));
+    field->weight_norm = network->Flag("weight_norm", field->weight_norm);
     field->features = static_cast<int>(network->Integer("features", field->features, {0, 1024}));
     field->unit_mm = network->Number("unit_mm", field->unit_mm, kPositive);
     const std::string name = network->Choice("reflectance", kReflectanceNames[int(field->reflectance)],
@@ -62,6 +126,7 @@ void ReadField(const ConfigTable& root, FieldOptions* field) {
     field->ambient_hidden = Widths(*network, "ambient_hidden", field->ambient_hidden);
   }
   if (const auto initial = root.Optional("initial")) {
+    ReadChoice(*initial, "shape", kShapeNames, &field->initial.shape);
     field->initial.radius_mm = initial->Number("radius_mm", field->initial.radius_mm, kPositive);
     field->initial.reach_mm = initial->Number("reach_mm", field->initial.reach_mm, kNotNegative);
   }
@@ -76,6 +141,12 @@ void ReadRest(const ConfigTable& root, TrainOptions* options) {
   if (const auto sampling = root.Optional("sampling")) {
     auto& s = options->sampling;
     s.rays = static_cast<int>(sampling->Integer("rays", s.rays, {1, 1 << 20}));
+    ReadChoice(*sampling, "sampler", kSamplerNames, &s.kind);
+    s.uniform = static_cast<int>(sampling->Integer("uniform", s.uniform, {2, 4096}));
+    s.rounds = static_cast<int>(sampling->Integer("rounds", s.rounds, {0, 64}));
+    s.round = static_cast<int>(sampling->Integer("round", s.round, {1, 4096}));
+    s.round_sharpness_per_mm =
+        sampling->Number("round_sharpness_per_mm", s.round_sharpness_per_mm, kPositive);
     s.coarse = static_cast<int>(sampling->Integer("coarse", s.coarse, {2, 4096}));
     s.surface = static_cast<int>(sampling->Integer("surface", s.surface, {1, 4096}));
     s.spread = static_cast<int>(sampling->Integer("spread", s.spread, {1, 4096}));
@@ -96,6 +167,10 @@ void ReadRest(const ConfigTable& root, TrainOptions* options) {
     s.seconds = schedule->Number("seconds", s.seconds, kNotNegative);
     s.learning_rate = schedule->Number("learning_rate", s.learning_rate, kPositive);
     s.learning_rate_final = schedule->Number("learning_rate_final", s.learning_rate_final, {1e-9, 1});
+    ReadChoice(*schedule, "decay", kDecayNames, &s.decay);
+    s.warm_up = schedule->Number("warm_up", s.warm_up, {0, 0.999});
+    s.adam_beta2 = schedule->Number("adam_beta2", s.adam_beta2, {0, 0.999999});
+    s.sharpness_rate = schedule->Number("sharpness_rate", s.sharpness_rate, kNotNegative);
     s.sharpness_start_per_mm =
         schedule->Number("sharpness_start_per_mm", s.sharpness_start_per_mm, kPositive);
     s.sharpness_end_per_mm = schedule->Number("sharpness_end_per_mm", s.sharpness_end_per_mm, kPositive);
@@ -112,30 +187,49 @@ std::string Array(const std::vector<int>& values) {
   return text + "]";
 }
 
+// What no single key is at fault for.
+void RequireFit(const TrainOptions& options) {
+  const FieldOptions& field = options.field;
+  const int layers = static_cast<int>(field.sdf_hidden.size());
+  if (field.sdf_skip > layers) {
+    throw InputError("network.sdf_skip = " + std::to_string(field.sdf_skip) +
+                     ": the distance network's last layer is " + std::to_string(layers));
+  }
+  const int inputs = field.grid.levels * Grid<float>::kFeatures + 6 * field.place_octaves + 3;
+  if (field.sdf_skip > 0 && field.sdf_hidden[field.sdf_skip - 1] <= inputs) {
+    throw InputError("network.sdf_skip: " + std::to_string(field.sdf_hidden[field.sdf_skip - 1]) +
+                     " numbers can't hold the " + std::to_string(inputs) +
+                     " of the encoding and the layer before it; widen network.sdf_hidden");
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> PresetNames() {
   std::vector<std::string> names;
-  for (const Preset& preset : kPresets) names.push_back(preset.name);
+  for (const Preset& preset : Presets()) names.push_back(preset.name);
   return names;
 }
 
 TrainOptions ReadTrainOptions(const std::string& name, const std::vector<std::string>& settings) {
-  for (const Preset& preset : kPresets) {
+  for (const Preset& preset : Presets()) {
     if (name != preset.name) continue;
     TrainOptions options;
     options.preset = name;
     // The preset itself first: what the command line sets lies on top of it.
-    for (const auto& config :
-         {Config::Parse(preset.text, "preset " + name), Config::Parse("", "command line", {}, settings)}) {
+    std::vector<Config> configs;
+    for (const char* text : preset.texts) configs.push_back(Config::Parse(text, "preset " + name));
+    configs.push_back(Config::Parse("", "command line", {}, settings));
+    for (const Config& config : configs) {
       ReadField(config.root(), &options.field);
       ReadRest(config.root(), &options);
       config.RejectUnknown();
     }
+    RequireFit(options);
     return options;
   }
   std::string known;
-  for (const Preset& preset : kPresets) known += std::string(known.empty() ? "" : ", ") + preset.name;
+  for (const Preset& preset : Presets()) known += std::string(known.empty() ? "" : ", ") + preset.name;
   throw InputError("--preset " + name + ": no such preset; there are: " + known);
 }
 
@@ -147,15 +241,22 @@ std::string FormatTrainOptions(const TrainOptions& o) {
       << "\ncoarsest_cell_mm = " << o.field.grid.coarsest_cell_mm
       << "\nfinest_cell_mm = " << o.field.grid.finest_cell_mm
       << "\nlog2_table_size = " << o.field.grid.log2_table_size
-      << "\n\n[network]\nsdf_hidden = " << Array(o.field.sdf_hidden)
+      << "\n\n[network]\nsdf_hidden = " << Array(o.field.sdf_hidden) << "\nsdf_activation = \""
+      << kActivationNames[int(o.field.sdf_activation)] << "\"\nsdf_skip = " << o.field.sdf_skip
+      << "\nweight_norm = " << (o.field.weight_norm ? "true" : "false")
+      << "\nplace_octaves = " << o.field.place_octaves
+      << "\ndirection_octaves = " << o.field.direction_octaves
       << "\ncolor_hidden = " << Array(o.field.color_hidden) << "\nfeatures = " << o.field.features
       << "\nunit_mm = " << o.field.unit_mm << "\nreflectance = \""
       << kReflectanceNames[int(o.field.reflectance)] << "\"\ninterreflection = \""
       << kInterreflectionNames[int(o.field.interreflection)]
-      << "\"\nambient_hidden = " << Array(o.field.ambient_hidden)
-      << "\n\n[initial]\nradius_mm = " << o.field.initial.radius_mm
+      << "\"\nambient_hidden = " << Array(o.field.ambient_hidden) << "\n\n[initial]\nshape = \""
+      << kShapeNames[int(o.field.initial.shape)] << "\"\nradius_mm = " << o.field.initial.radius_mm
       << "\nreach_mm = " << o.field.initial.reach_mm << "\n\n[bounds]\nahead_mm = " << o.bounds.ahead_mm
       << "\naside_mm = " << o.bounds.aside_mm << "\n\n[sampling]\nrays = " << o.sampling.rays
+      << "\nsampler = \"" << kSamplerNames[int(o.sampling.kind)] << "\"\nuniform = " << o.sampling.uniform
+      << "\nrounds = " << o.sampling.rounds << "\nround = " << o.sampling.round
+      << "\nround_sharpness_per_mm = " << o.sampling.round_sharpness_per_mm
       << "\ncoarse = " << o.sampling.coarse << "\nsurface = " << o.sampling.surface
       << "\nspread = " << o.sampling.spread << "\nsurface_spacing = " << o.sampling.surface_spacing
       << "\nweight_threshold = " << o.sampling.weight_threshold << "\n\n[loss]\neikonal = " << o.loss.eikonal
@@ -163,7 +264,9 @@ std::string FormatTrainOptions(const TrainOptions& o) {
       << "\nambient = " << o.loss.ambient << "\nalbedo_width = " << o.loss.albedo_width
       << "\n\n[schedule]\niterations = " << o.schedule.iterations << "\nseconds = " << o.schedule.seconds
       << "\nlearning_rate = " << o.schedule.learning_rate
-      << "\nlearning_rate_final = " << o.schedule.learning_rate_final
+      << "\nlearning_rate_final = " << o.schedule.learning_rate_final << "\ndecay = \""
+      << kDecayNames[int(o.schedule.decay)] << "\"\nwarm_up = " << o.schedule.warm_up
+      << "\nadam_beta2 = " << o.schedule.adam_beta2 << "\nsharpness_rate = " << o.schedule.sharpness_rate
       << "\nsharpness_start_per_mm = " << o.schedule.sharpness_start_per_mm
       << "\nsharpness_end_per_mm = " << o.schedule.sharpness_end_per_mm
       << "\ncheckpoint_seconds = " << o.schedule.checkpoint_seconds

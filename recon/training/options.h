@@ -9,6 +9,16 @@
 
 namespace lumen {
 
+enum class SamplerKind {
+  kGuided,      // a few look-ups find the surface, most samples go there
+  kImportance,  // NeuS's: uniform samples, then rounds of samples drawn from the weights so far
+};
+
+enum class Decay {
+  kExponential,
+  kCosine,  // NeuS's
+};
+
 struct TrainOptions {
   std::string preset;
   int frames = 20;  // taken uniformly over the sequence
@@ -20,12 +30,22 @@ struct TrainOptions {
   } bounds;
 
   struct Sampling {
-    int rays = 256;              // a step
+    int rays = 256;  // a step
+    SamplerKind kind = SamplerKind::kGuided;
+    // Of the guided sampler:
     int coarse = 16;             // look-ups that find where a ray meets the surface
     int surface = 8;             // samples placed around that
     int spread = 9;              // samples spread in front of it
     double surface_spacing = 1;  // of those around it, in units of 1/s
+    // Of the importance sampler:
+    int uniform = 64;
+    int rounds = 4;
+    int round = 16;                             // samples a round
+    double round_sharpness_per_mm = 64 / 68.0;  // of the first; it doubles from round to round
+    // Of both: samples that weigh less are left out of shading and of the eikonal term; 0 = none.
     double weight_threshold = 1e-3;
+
+    int PerRay() const { return kind == SamplerKind::kGuided ? surface + spread : uniform + rounds * round; }
   } sampling;
 
   struct Loss {
@@ -41,15 +61,22 @@ struct TrainOptions {
     double seconds = 0;  // > 0: the run is as long as that instead
     double learning_rate = 1e-2;
     double learning_rate_final = 0.05;  // the part of it that is left at the end
+    Decay decay = Decay::kExponential;
+    double warm_up = 0;  // the part of the run over which the rate rises from 0
+    double adam_beta2 = 0.99;
     double sharpness_start_per_mm = 0.6;
     double sharpness_end_per_mm = 4.4;
+    // > 0: the sharpness is learnt from its start on, its logarithm at so many times the learning rate. 0: it
+    // grows from start to end by schedule.
+    double sharpness_rate = 0;
     double checkpoint_seconds = 10;  // between checkpoints
   } schedule;
 
   double extract_cell_mm = 0.75;
 };
 
-// Names of the presets: "fast" (ours) and "neus" (the same without the decline: the baseline).
+// Names of the presets: "fast" (ours), "paper" (NeuS's networks and schedule with the changes of LightNeuS),
+// and "neus" and "neus_paper", the same without the decline and without normalisation: the baselines.
 std::vector<std::string> PresetNames();
 
 // A preset with the command line's settings ("loss.eikonal=0.05") on top. Throws InputError: no such preset,

@@ -17,6 +17,7 @@ LossTerms& LossTerms::operator+=(const LossTerms& other) {
   eikonal += other.eikonal;
   albedo += other.albedo;
   ambient += other.ambient;
+  by_log_sharpness += other.by_log_sharpness;
   active_samples += other.active_samples;
   return *this;
 }
@@ -51,7 +52,7 @@ void RayLoss<T>::SelectActive(const RayBatch<T>& batch, const LossSettings<T>& s
       const size_t i = r * n + k;
       // A sample's own weight, and the light that a change of its distance could still take away.
       const T influence = transmittance_[i] * Sigmoid(-settings.sharpness * signed_distance_[i]);
-      const bool seen = weight_[i] > settings.weight_threshold || influence > settings.weight_threshold;
+      const bool seen = weight_[i] >= settings.weight_threshold || influence >= settings.weight_threshold;
       if (!seen && k != batch.rays[r].eikonal_sample) continue;
       active_.push_back({static_cast<int>(r), k, seen ? weight_[i] : T(0), T(0)});
     }
@@ -174,6 +175,9 @@ void RayLoss<T>::BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& 
     RayWeightsBackward(n, &signed_distance_[r * n], settings.sharpness, &transmittance_[r * n],
                        &weight_delta_[r * n], &distance_delta_[r * n]);
   }
+  // The weights depend on s · f only.
+  for (size_t i = 0; i < distance_delta_.size(); ++i)
+    terms->by_log_sharpness += double(signed_distance_[i]) * double(distance_delta_[i]);
   for (size_t i = 0; i < active_.size(); ++i) {
     surface_.value_delta.At(0, i) = distance_delta_[size_t(active_[i].ray) * n + active_[i].sample];
   }

@@ -40,17 +40,18 @@ struct LossSettings {
   T albedo_weight;   // of the pull of the albedo to the batch's mean; kLambertian only
   T albedo_width;    // of its Huber loss, in log
   T ambient_weight;  // of the same pull on the log ambient factor
-  // Samples whose weight and whose influence on any weight are below this are left out.
+  // Samples whose weight and whose influence on any weight are below this are left out; 0 = none.
   T weight_threshold;
   T per_ray;  // 1/number of rays of the whole step
 };
 
-// Sums over a batch; each is a part of the step's loss.
+// Sums over a batch; the first four are the parts of the step's loss.
 struct LossTerms {
   double photometric = 0;
   double eikonal = 0;
   double albedo = 0;
   double ambient = 0;
+  double by_log_sharpness = 0;  // ∂loss/∂log s
   int64_t active_samples = 0;
 
   double Sum() const { return photometric + eikonal + albedo + ambient; }

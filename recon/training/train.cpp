@@ -41,8 +41,8 @@ class Run {
     WriteFile(run_.folder / "config.toml", settings_);
     Optimise();
     WriteCheckpoint(run_.folder / "checkpoint", settings_, trainer_.state());
-    const Mesh mesh = ExtractMesh(trainer_.field(), trainer_.state().parameters.data(), trainer_.origin(),
-                                  {options_.extract_cell_mm});
+    const Mesh mesh =
+        ExtractMesh(trainer_.field(), trainer_.Weights(), trainer_.origin(), {options_.extract_cell_mm});
     if (mesh.faces.empty()) {
       throw InputError(run_.folder.string() +
                        ": training left no surface; check poses and light, or train longer");

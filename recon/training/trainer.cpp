@@ -5,11 +5,16 @@
 
 #include "common/parallel.h"
 #include "common/random.h"
+#include "recon/training/march.h"
 
 namespace lumen {
 namespace {
 
 constexpr int kChunkRays = 32;  // also what the pulls on albedo and ambient factor take their means over
+
+// Rays that are computed at once where chunks share workspaces: enough to keep the products busy, few enough
+// for the memory that a wide network's passes take.
+constexpr int kPieceRays = 8;
 
 double LogInterpolate(double from, double to, double at) { return from * std::pow(to / from, at); }
 
@@ -44,20 +49,23 @@ Trainer::Trainer(const TrainingFrames& frames, const TrainOptions& options, uint
     lights_.back().mean_radiance = frames.MeanRadiance(static_cast<int>(lights_.size()) - 1).cast<float>();
   }
   for (int begin = 0; begin < options.sampling.rays; begin += kChunkRays) {
-    auto chunk = std::make_unique<Chunk>(field_.get());
-    chunk->batch.rays.resize(std::min(kChunkRays, options.sampling.rays - begin));
-    chunk->network_gradient.assign(field_->network_size(), 0.0f);
-    chunk->log_gain_gradient.assign(frames.size(), 0.0f);
+    Chunk chunk;
+    chunk.rays = std::min(kChunkRays, options.sampling.rays - begin);
+    chunk.network_gradient.assign(field_->network_size(), 0.0f);
+    chunk.log_gain_gradient.assign(frames.size(), 0.0f);
     chunks_.push_back(std::move(chunk));
   }
-  const size_t count = field_->parameter_count();
+  norm_ = field_->Normalisation();
+  const size_t count = field_->parameter_count() + norm_.lengths();
   state_.parameters.resize(count);
   state_.first.assign(count, 0.0f);
   state_.second.assign(count, 0.0f);
   gradient_.assign(count, 0.0f);
   state_.log_gain.assign(frames.size(), 0.0f);
   state_.log_gain_first = state_.log_gain_second = state_.log_gain;
+  state_.log_sharpness[0] = static_cast<float>(std::log(options.schedule.sharpness_start_per_mm));
   field_->Initialise(seed, state_.parameters.data());
+  norm_.Initialise(state_.parameters.data());
   if (options.field.reflectance != Reflectance::kUnlit) MatchColorsToInitialSurface(initial);
 }
 
@@ -71,7 +79,7 @@ void Trainer::MatchColorsToInitialSurface(const InitialSurface& initial) {
   batch.rays.resize(kRays);
   const uint64_t key = RandomBits(seed_, 0x636f6c6f7273ull);
   for (int r = 0; r < kRays; ++r) frames_.Draw(RandomBits(key, r), origin_, &batch.rays[r]);
-  Marcher(field_.get()).Place(state_.parameters.data(), options_.sampling, kSharp, key, &batch);
+  Marcher(field_.get()).Place(Weights(), options_.sampling, kSharp, key, &batch);
   Panel<float> positions(3, TilesFor(kRays)), value(1, TilesFor(kRays)), normal(3, TilesFor(kRays));
   for (int r = 0; r < kRays; ++r) {
     const float t = batch.distance[size_t(r + 1) * batch.samples - 1];
@@ -102,11 +110,20 @@ void Trainer::MatchColorsToInitialSurface(const InitialSurface& initial) {
   }
 }
 
+const float* Trainer::Weights() {
+  if (norm_.empty()) return state_.parameters.data();
+  weights_.resize(field_->parameter_count());
+  norm_.Expand(state_.parameters.data(), weights_.data());
+  return weights_.data();
+}
+
 LossSettings<float> Trainer::SettingsAt(double progress) const {
   const auto& schedule = options_.schedule;
   LossSettings<float> settings;
-  settings.sharpness = static_cast<float>(
-      LogInterpolate(schedule.sharpness_start_per_mm, schedule.sharpness_end_per_mm, progress));
+  settings.sharpness = schedule.sharpness_rate > 0
+                           ? std::exp(state_.log_sharpness[0])
+                           : static_cast<float>(LogInterpolate(schedule.sharpness_start_per_mm,
+                                                               schedule.sharpness_end_per_mm, progress));
   settings.inverse_gamma = static_cast<float>(frames_.inverse_gamma());
   settings.eikonal_weight = static_cast<float>(options_.loss.eikonal);
   const bool lambertian = options_.field.reflectance == Reflectance::kLambertian;
@@ -120,41 +137,88 @@ LossSettings<float> Trainer::SettingsAt(double progress) const {
   return settings;
 }
 
-void Trainer::RunChunk(int index, const LossSettings<float>& settings) {
-  Chunk& chunk = *chunks_[index];
-  const uint64_t step_key = RandomBits(seed_, 0x7261797300ull, static_cast<uint64_t>(state_.iteration));
-  for (size_t r = 0; r < chunk.batch.rays.size(); ++r) {
-    frames_.Draw(RandomBits(step_key, static_cast<uint64_t>(index) * kChunkRays + r), origin_,
-                 &chunk.batch.rays[r]);
+double Trainer::RateAt(double progress) const {
+  const auto& schedule = options_.schedule;
+  const double start = schedule.learning_rate, end = start * schedule.learning_rate_final;
+  if (progress < schedule.warm_up) return start * progress / schedule.warm_up;
+  const double at = (progress - schedule.warm_up) / (1 - schedule.warm_up);
+  if (schedule.decay == Decay::kCosine) return end + (start - end) * (1 + std::cos(kPi * at)) / 2;
+  return LogInterpolate(start, end, at);
+}
+
+std::unique_ptr<Trainer::Workspace> Trainer::TakeWorkspace(Chunk* chunk) {
+  std::unique_ptr<Workspace> workspace = std::move(chunk->workspace);
+  if (!workspace) {
+    const std::lock_guard lock(idle_mutex_);
+    if (!idle_.empty()) {
+      workspace = std::move(idle_.back());
+      idle_.pop_back();
+    }
   }
-  chunk.marcher.Place(state_.parameters.data(), options_.sampling, settings.sharpness,
-                      RandomBits(step_key, static_cast<uint64_t>(index), 1), &chunk.batch);
-  chunk.terms = chunk.loss.Evaluate(state_.parameters.data(), chunk.batch, lights_, state_.log_gain, settings,
-                                    chunk.network_gradient.data(), chunk.log_gain_gradient.data());
-  double sum = chunk.terms.Sum();
+  if (!workspace) workspace = std::make_unique<Workspace>(options_.sampling, field_.get());
+  return workspace;
+}
+
+void Trainer::LeaveWorkspace(std::unique_ptr<Workspace> workspace, Chunk* chunk) {
+  if (has_grid()) {
+    chunk->workspace = std::move(workspace);
+    return;
+  }
+  const std::lock_guard lock(idle_mutex_);
+  idle_.push_back(std::move(workspace));
+}
+
+void Trainer::RunChunk(int index, const float* weights, const LossSettings<float>& settings) {
+  Chunk& chunk = chunks_[index];
+  std::unique_ptr<Workspace> workspace = TakeWorkspace(&chunk);
+  RayBatch<float>& batch = workspace->batch;
+  const uint64_t step_key = RandomBits(seed_, 0x7261797300ull, static_cast<uint64_t>(state_.iteration));
+  const int piece = has_grid() ? chunk.rays : kPieceRays;
+  chunk.terms = {};
+  for (int begin = 0; begin < chunk.rays; begin += piece) {
+    batch.rays.resize(std::min(piece, chunk.rays - begin));
+    for (size_t r = 0; r < batch.rays.size(); ++r) {
+      frames_.Draw(RandomBits(step_key, static_cast<uint64_t>(index) * kChunkRays + begin + r), origin_,
+                   &batch.rays[r]);
+    }
+    workspace->sampler->Place(weights, options_.sampling, settings.sharpness,
+                              RandomBits(step_key, static_cast<uint64_t>(index), 1 + begin), &batch);
+    chunk.terms += workspace->loss.Evaluate(weights, batch, lights_, state_.log_gain, settings,
+                                            chunk.network_gradient.data(), chunk.log_gain_gradient.data());
+  }
+  double sum = chunk.terms.Sum() + chunk.terms.by_log_sharpness;
   for (float g : chunk.network_gradient) sum += g;
-  chunk.finite = std::isfinite(sum) && chunk.loss.GridGradientIsFinite();
+  chunk.finite = std::isfinite(sum) && (!has_grid() || workspace->loss.GridGradientIsFinite());
+  LeaveWorkspace(std::move(workspace), &chunk);
 }
 
 bool Trainer::GradientsAreFinite() const {
-  return std::all_of(chunks_.begin(), chunks_.end(), [](const auto& chunk) { return chunk->finite; });
+  return std::all_of(chunks_.begin(), chunks_.end(), [](const Chunk& chunk) { return chunk.finite; });
+}
+
+void Trainer::ClearChunks() {
+  for (Chunk& chunk : chunks_) {
+    std::fill(chunk.network_gradient.begin(), chunk.network_gradient.end(), 0.0f);
+    std::fill(chunk.log_gain_gradient.begin(), chunk.log_gain_gradient.end(), 0.0f);
+  }
 }
 
 void Trainer::UpdateNetworks(const AdamStep& step) {
   const size_t begin = field_->grid_size();
-  for (auto& chunk : chunks_) {
-    for (size_t i = 0; i < field_->network_size(); ++i) gradient_[begin + i] += chunk->network_gradient[i];
-    std::fill(chunk->network_gradient.begin(), chunk->network_gradient.end(), 0.0f);
+  for (Chunk& chunk : chunks_) {
+    for (size_t i = 0; i < field_->network_size(); ++i) gradient_[begin + i] += chunk.network_gradient[i];
+    std::fill(chunk.network_gradient.begin(), chunk.network_gradient.end(), 0.0f);
   }
-  AdamUpdate(step, field_->network_size(), &state_.parameters[begin], &gradient_[begin], &state_.first[begin],
-             &state_.second[begin]);
+  norm_.PullBack(state_.parameters.data(), gradient_.data());
+  AdamUpdate(step, field_->network_size() + norm_.lengths(), &state_.parameters[begin], &gradient_[begin],
+             &state_.first[begin], &state_.second[begin]);
 }
 
 void Trainer::UpdateGains(const AdamStep& step) {
   std::vector<float> gradient(state_.log_gain.size(), 0.0f);
-  for (auto& chunk : chunks_) {
-    for (size_t i = 0; i < gradient.size(); ++i) gradient[i] += chunk->log_gain_gradient[i];
-    std::fill(chunk->log_gain_gradient.begin(), chunk->log_gain_gradient.end(), 0.0f);
+  for (Chunk& chunk : chunks_) {
+    for (size_t i = 0; i < gradient.size(); ++i) gradient[i] += chunk.log_gain_gradient[i];
+    std::fill(chunk.log_gain_gradient.begin(), chunk.log_gain_gradient.end(), 0.0f);
   }
   if (frames_.gains_known() || options_.field.reflectance == Reflectance::kUnlit) return;
   // The first frame's gain is 1: the others' are relative to it.
@@ -162,38 +226,44 @@ void Trainer::UpdateGains(const AdamStep& step) {
              state_.log_gain_first.data() + 1, state_.log_gain_second.data() + 1);
 }
 
+void Trainer::UpdateSharpness(double rate, double gradient) {
+  const auto& schedule = options_.schedule;
+  if (!(schedule.sharpness_rate > 0)) return;
+  float slope = static_cast<float>(gradient);
+  auto& [value, first, second] = state_.log_sharpness;
+  AdamUpdate(AdamStep(rate * schedule.sharpness_rate, state_.iteration, schedule.adam_beta2), 1, &value,
+             &slope, &first, &second);
+}
+
 StepReport Trainer::Step(double progress) {
   const LossSettings<float> settings = SettingsAt(progress);
+  const float* weights = Weights();
   StepReport report;
   report.sharpness_per_mm = settings.sharpness;
   ParallelFor(0, static_cast<int64_t>(chunks_.size()),
-              [&](int64_t i) { RunChunk(static_cast<int>(i), settings); });
-  for (const auto& chunk : chunks_) report.loss += chunk->terms;
+              [&](int64_t i) { RunChunk(static_cast<int>(i), weights, settings); });
+  for (const Chunk& chunk : chunks_) report.loss += chunk.terms;
   ++state_.iteration;
   if (!GradientsAreFinite()) {
     report.skipped = true;
     if (state_.skipped_steps++ == 0) state_.first_skipped_step = state_.iteration - 1;
-    for (auto& chunk : chunks_) {
-      std::fill(chunk->network_gradient.begin(), chunk->network_gradient.end(), 0.0f);
-      std::fill(chunk->log_gain_gradient.begin(), chunk->log_gain_gradient.end(), 0.0f);
-    }
+    ClearChunks();
     return report;
   }
-  const double rate =
-      LogInterpolate(options_.schedule.learning_rate,
-                     options_.schedule.learning_rate * options_.schedule.learning_rate_final, progress);
-  const AdamStep step(rate, state_.iteration);
+  const double rate = RateAt(progress);
+  const AdamStep step(rate, state_.iteration, options_.schedule.adam_beta2);
   const int levels = field_->grid().levels();
   ParallelFor(0, levels + 1, [&](int64_t task) {
     if (task == levels) return UpdateNetworks(step);
     // From the finest level on, which has the most to do.
     const int level = levels - 1 - static_cast<int>(task);
-    for (auto& chunk : chunks_) chunk->loss.GridBackward(level, gradient_.data());
+    for (Chunk& chunk : chunks_) chunk.workspace->loss.GridBackward(level, gradient_.data());
     const size_t begin = field_->grid().level_begin(level);
     AdamUpdate(step, field_->grid().level_size(level), &state_.parameters[begin], &gradient_[begin],
                &state_.first[begin], &state_.second[begin]);
   });
   UpdateGains(step);
+  UpdateSharpness(rate, report.loss.by_log_sharpness);
   return report;
 }
 

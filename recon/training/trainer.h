@@ -2,15 +2,17 @@
 // the seed only, never on the number of threads.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
+#include <mutex>
 #include <string>
 #include <vector>
 
 #include "recon/network/adam.h"
-#include "recon/training/march.h"
 #include "recon/training/options.h"
 #include "recon/training/ray_loss.h"
+#include "recon/training/ray_sampler.h"
 #include "recon/training/training_frames.h"
 
 namespace lumen {
@@ -18,8 +20,11 @@ namespace lumen {
 // Everything that a step changes; what a checkpoint holds.
 struct TrainState {
   int64_t iteration = 0;
-  double seconds = 0;                           // spent so far; only runs that end by the clock count them
-  LineVector<float> parameters, first, second;  // Adam's moments
+  double seconds = 0;  // spent so far; only runs that end by the clock count them
+  // What is learnt: the field's parameters and, with weight normalisation, lengths behind them (see
+  // recon/network/weight_norm.h); and Adam's moments.
+  LineVector<float> parameters, first, second;
+  std::array<float, 3> log_sharpness = {};  // of s in 1/mm, and its moments; where it is learnt
   std::vector<float> log_gain, log_gain_first, log_gain_second;  // a frame; 0 where the gain is known
   int64_t skipped_steps = 0;                                     // whose loss or gradient was not finite
   int64_t first_skipped_step = -1;
@@ -40,28 +45,43 @@ class Trainer {
   StepReport Step(double progress);
 
   const Field<float>& field() const { return *field_; }
+  // The field's parameters as they are now.
+  const float* Weights();
   // World point that the field's coordinates count from.
   const Vec3d& origin() const { return origin_; }
   TrainState& state() { return state_; }
   const TrainState& state() const { return state_; }
 
  private:
-  // Rays that are computed together, by one thread.
-  struct Chunk {
-    explicit Chunk(const Field<float>* field) : marcher(field), loss(field) {}
+  // What computing with some rays takes.
+  struct Workspace {
+    Workspace(const TrainOptions::Sampling& sampling, const Field<float>* field)
+        : sampler(MakeRaySampler(sampling, field)), loss(field) {}
     RayBatch<float> batch;
-    Marcher marcher;
+    std::unique_ptr<RaySampler> sampler;
     RayLoss<float> loss;
+  };
+  // Rays that are computed by one thread. With a grid all together, as the workspace holds what goes back to
+  // the grid; without one piece by piece, in a workspace that chunks hand on to each other.
+  struct Chunk {
+    int rays = 0;
+    std::unique_ptr<Workspace> workspace;
     LineVector<float> network_gradient;
     std::vector<float> log_gain_gradient;
     LossTerms terms;
     bool finite = true;  // loss and gradient
   };
-  void RunChunk(int index, const LossSettings<float>& settings);
+  bool has_grid() const { return field_->grid_size() > 0; }
+  std::unique_ptr<Workspace> TakeWorkspace(Chunk* chunk);
+  void LeaveWorkspace(std::unique_ptr<Workspace> workspace, Chunk* chunk);
+  void RunChunk(int index, const float* weights, const LossSettings<float>& settings);
+  void ClearChunks();
+  double RateAt(double progress) const;
   LossSettings<float> SettingsAt(double progress) const;
   bool GradientsAreFinite() const;
   void UpdateNetworks(const AdamStep& step);
   void UpdateGains(const AdamStep& step);
+  void UpdateSharpness(double rate, double gradient);
   void MatchColorsToInitialSurface(const InitialSurface& initial);
 
   const TrainingFrames& frames_;
@@ -70,7 +90,11 @@ class Trainer {
   Vec3d origin_;
   std::unique_ptr<Field<float>> field_;
   std::vector<FrameLight<float>> lights_;
-  std::vector<std::unique_ptr<Chunk>> chunks_;
+  WeightNorm<float> norm_;
+  LineVector<float> weights_;  // the field's parameters, where they aren't what is learnt
+  std::vector<Chunk> chunks_;
+  std::mutex idle_mutex_;
+  std::vector<std::unique_ptr<Workspace>> idle_;
   LineVector<float> gradient_;
   TrainState state_;
 };
