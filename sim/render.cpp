@@ -12,17 +12,12 @@
 #include "sim/face_visibility.h"
 #include "sim/geometry/moving_wall.h"
 #include "sim/ground_truth.h"
+#include "sim/metering.h"
 #include "sim/photographer.h"
 #include "sim/surface_maps.h"
 
 namespace lumen {
 namespace {
-
-// The automatic gain meters every frame on a small picture of it, so that a frame's gain doesn't depend on
-// which frames are rendered. Its random numbers are its own.
-constexpr int kMeterReduction = 8;
-constexpr int kMeterSamples = 4;
-constexpr uint64_t kMeterSeed = 0x6d65746572ull;
 
 class Renderer {
  public:
@@ -86,43 +81,22 @@ class Renderer {
     return path_scene;
   }
 
-  View ViewOf(int frame, const Camera<float>& camera, const Image8& valid) const {
-    return {&camera, &valid, scene_.world_from_camera[frame], &scene_.calibration.light};
-  }
-
   std::vector<double> Gains() {
     if (!scene_.sensor.auto_gain)
       return std::vector<double>(scene_.world_from_camera.size(), scene_.sensor.gain);
-    Calibration small = scene_.calibration;
-    small.camera = Resized(small.camera, std::max(1, small.camera.width / kMeterReduction),
-                           std::max(1, small.camera.height / kMeterReduction));
-    small.mask = Image8(small.camera.width, small.camera.height, 1);
-    for (int y = 0; y < small.mask.height; ++y) {
-      for (int x = 0; x < small.mask.width; ++x) {  // as the picture's pixel at its middle
-        *small.mask.Pixel(x, y) =
-            *valid_.Pixel(static_cast<int>((x + 0.5) * valid_.width / small.mask.width),
-                          static_cast<int>((y + 0.5) * valid_.height / small.mask.height));
-      }
-    }
-    const Camera<double> camera(small.camera);
-    const Camera<float> fast_camera(small.camera);
-    const Image8 valid = ValidPixels(small);
-    PathOptions path = scene_.path;
-    path.samples = kMeterSamples;
+    const Meter meter(scene_, valid_, options_.seed);
     std::vector<double> brightness;
     for (int frame = 0; frame < last_; ++frame) {
-      Film film;
-      const PathCount count = RenderFrame(PathSceneOf(*walls_.At(frame)), ViewOf(frame, fast_camera, valid),
-                                          path, RandomBits(options_.seed, kMeterSeed), frame, false, &film);
+      PathCount count;
+      brightness.push_back(meter.Brightness(PathSceneOf(*walls_.At(frame)), frame, &count));
       NoteFailure(frame, " of the metering picture", count.failure);
-      brightness.push_back(MeterBrightness(scene_.calibration.response, film.radiance, valid, camera));
     }
     return RunAutoGain(*scene_.sensor.auto_gain, scene_.calibration.response, brightness);
   }
 
   void RenderOne(int frame, double gain) {
     const std::shared_ptr<const WallMoment> wall = walls_.At(frame);
-    View view = ViewOf(frame, fast_camera_, valid_);
+    View view = {&fast_camera_, &valid_, scene_.world_from_camera[frame], &scene_.calibration.light};
     if (scene_.defocus) view.defocus = &*scene_.defocus;
     std::optional<CameraMotion> motion;
     if (scene_.sensor.shutter) {

@@ -55,6 +55,9 @@ PathOptions ReadPath(const ConfigTable& table) {
   path.bounces = static_cast<int>(table.Integer("bounces", path.bounces, {0, 10000}));
   path.roulette_after = static_cast<int>(table.Integer("roulette_after", path.roulette_after, {0, 10000}));
   path.shared_paths = static_cast<int>(table.Integer("shared_paths", path.shared_paths, {0, 4096}));
+  if (table.Choice("sampler", "sobol", {"sobol", "independent"}) == "independent") {
+    path.sampler = Sampling::kIndependent;
+  }
   return path;
 }
 

@@ -154,6 +154,7 @@ contrast = 0.1
 [path]
 samples = 2
 bounces = 1
+[sensor.auto_gain]
 [sensor.jpeg]
 quality = 90
 )");
@@ -168,6 +169,21 @@ TEST(RenderCost, KnobsHoldTheScenesOwnSettingOnce) {
   }
 }
 
+TEST(RenderCost, KnobsAreTheOnesThatTheSceneKnows) {
+  ScratchFolder scratch;
+  Scene scene = SmallScene(scratch);
+  const auto names = [&] {
+    std::vector<std::string> names;
+    for (const Knob& knob : KnobsOf(scene)) names.push_back(knob.name);
+    return names;
+  };
+  EXPECT_EQ(names(), (std::vector<std::string>{"samples", "roulette_after", "shared_paths", "sampler",
+                                               "packets", "precision", "bounces"}));
+  scene.path.bounces = 0;
+  scene.surface.coat = Coat({});  // the plain tracer has none
+  EXPECT_EQ(names(), (std::vector<std::string>{"samples", "sampler", "bounces"}));
+}
+
 TEST(RenderCost, SwitchesTakeEffectsOut) {
   ScratchFolder scratch;
   const Scene scene = SmallScene(scratch);
@@ -177,9 +193,11 @@ TEST(RenderCost, SwitchesTakeEffectsOut) {
     names.push_back(effect.name);
     effect.switch_off(&without);
   }
-  EXPECT_EQ(names, (std::vector<std::string>{"interreflection", "mottling", "offset_guides", "jpeg"}));
+  EXPECT_EQ(names,
+            (std::vector<std::string>{"interreflection", "mottling", "offset_guides", "auto_gain", "jpeg"}));
   EXPECT_EQ(without.path.bounces, 0);
   EXPECT_FALSE(without.surface.mottling);
+  EXPECT_FALSE(without.sensor.auto_gain);
   EXPECT_FALSE(without.sensor.jpeg);
   ASSERT_EQ(without.calibration.light.sources.size(), 1u);
   EXPECT_TRUE(without.calibration.light.sources[0].position.isZero(0));
@@ -200,7 +218,7 @@ TEST(RenderCost, OneBounceIsTooDarkAndOneSampleTooNoisy) {
   // A closed wall of albedo 0.5 sends some half of its light on.
   EXPECT_LT(darkest->bias.value, -0.1);
   EXPECT_LT(darkest->bias.value, -5 * darkest->bias.standard_error);
-  ASSERT_EQ(cost.effects.size(), 4u);
+  ASSERT_EQ(cost.effects.size(), 5u);
   EXPECT_GT(cost.frame_seconds, 0);
   RenderCostOptions no_such_frame;
   no_such_frame.frame = 2;

@@ -15,19 +15,19 @@
 #include "common/random.h"
 #include "common/ray_scene.h"
 #include "sim/geometry/geometry.h"
+#include "tests/random_rays.h"
 #include "tests/support.h"
 
 namespace lumen {
 namespace {
 
+using test::Between;
+using test::RandomDirection;
 using test::SharedData;
+using test::TriangleSoup;
 
 constexpr float kFar = 1e4f;  // mm
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-double Between(double low, double high, uint64_t seed, uint64_t a, uint64_t b = 0) {
-  return low + (high - low) * UniformDouble(RandomBits(seed, a, b));
-}
 
 // In double; its numbers are exactly those of the float ray.
 struct Ray {
@@ -43,11 +43,9 @@ Ray RandomRay(const RayScene& scene, uint64_t seed, int64_t i) {
   const Vec3d centroid =
       (mesh.vertices[corners[0]] + mesh.vertices[corners[1]] + mesh.vertices[corners[2]]) / 3;
   const double inward_mm = 0.05 * std::pow(160, Between(0, 1, seed, i, 1));
-  const double z = Between(-1, 1, seed, i, 2), turn = Between(0, 2 * kPi, seed, i, 3);
-  const double across = std::sqrt(1 - z * z);
   Ray ray;
   ray.local_origin = scene.ToLocal(centroid - inward_mm * FaceNormal(mesh, face));
-  ray.direction = Vec3d(across * std::cos(turn), across * std::sin(turn), z).cast<float>();
+  ray.direction = RandomDirection(seed, i, 2);
   ray.origin = ray.local_origin.cast<double>() + scene.anchor();
   ray.direction_mm = ray.direction.cast<double>();
   return ray;
@@ -200,21 +198,6 @@ Mesh ProceduralColon() {
   return BuildGeometry(config.root(), 5).mesh;
 }
 
-Mesh TriangleSoup(int faces) {
-  Mesh mesh;
-  for (int face = 0; face < faces; ++face) {
-    Vec3d middle;
-    for (int i = 0; i < 3; ++i) middle[i] = Between(-30, 30, 1, face, i);
-    for (int corner = 0; corner < 3; ++corner) {
-      Vec3d vertex;
-      for (int i = 0; i < 3; ++i) vertex[i] = middle[i] + Between(-3, 3, 2, face, 3 * corner + i);
-      mesh.vertices.push_back(vertex);
-    }
-    mesh.faces.push_back({3 * face, 3 * face + 1, 3 * face + 2});
-  }
-  return mesh;
-}
-
 TEST(ExactKernel, RealColon) {
   const char* file = "colon_ct/EdinGCA00020_large_intestine_merged.obj";
   LUMEN_NEEDS_DATA(file);
@@ -223,11 +206,11 @@ TEST(ExactKernel, RealColon) {
 
 TEST(ExactKernel, ProceduralColon) { ExpectSame(ProceduralColon(), 400000, 32); }
 
-TEST(ExactKernel, TriangleSoup) { ExpectSame(TriangleSoup(20000), 100000, 33); }
+TEST(ExactKernel, TriangleSoup) { ExpectSame(TriangleSoup(20000, 3), 100000, 33); }
 
 // A mesh whose vertices lie elsewhere by a hundredth of a mm must not pass for the same.
 TEST(ExactKernel, TellsAMovedMesh) {
-  const Mesh mesh = TriangleSoup(2000);
+  const Mesh mesh = TriangleSoup(2000, 3);
   Mesh moved = mesh;
   for (Vec3d& vertex : moved.vertices) vertex.x() += 1e-2;
   const RayScene scene(mesh);

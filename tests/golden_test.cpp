@@ -7,7 +7,6 @@
 // that is meant to alter the expectation, LUMEN_WRITE_GOLDEN=tests/golden makes these tests write new frames.
 #include <gtest/gtest.h>
 
-#include <boost/math/distributions/students_t.hpp>
 #include <cmath>
 #include <cstdlib>
 
@@ -15,6 +14,7 @@
 #include "common/image.h"
 #include "sim/scene.h"
 #include "tests/support.h"
+#include "tests/welch.h"
 
 namespace lumen {
 namespace {
@@ -123,22 +123,19 @@ Golden ReadGolden(const std::filesystem::path& file) {
 // How many pixels' channels differ by more than chance explains.
 int Rejected(const Golden& a, const Golden& b) {
   const double count = static_cast<double>(a.mean.data.size());
-  const double each = -std::expm1(std::log1p(-kFalseAlarm) / count);
+  const double each = test::SharedOut(kFalseAlarm, count);
   int rejected = 0;
   for (size_t v = 0; v < a.mean.data.size(); ++v) {
-    const double va = a.variance.data[v], vb = b.variance.data[v], variance = va + vb;
+    const double va = a.variance.data[v], vb = b.variance.data[v];
     const double difference = std::abs(double(a.mean.data[v]) - b.mean.data[v]);
     // Without noise, as where nothing is lit, the means are the same but for their float rounding.
     const double rounding = 2 * 0x1p-24 * (std::abs(a.mean.data[v]) + std::abs(b.mean.data[v]));
     if (difference <= rounding) continue;
-    if (variance == 0) {
+    if (va + vb == 0) {
       ++rejected;
       continue;
     }
-    const double freedom = (kRenders - 1) * variance * variance / (va * va + vb * vb);
-    const boost::math::students_t chance(freedom);
-    rejected +=
-        2 * boost::math::cdf(boost::math::complement(chance, difference / std::sqrt(variance))) < each;
+    rejected += test::WelchChance(difference, va, vb, kRenders) < each;
   }
   return rejected;
 }

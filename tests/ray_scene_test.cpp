@@ -1,9 +1,5 @@
 #include "common/ray_scene.h"
 
-#include <CGAL/AABB_traits.h>
-#include <CGAL/AABB_tree.h>
-#include <CGAL/AABB_triangle_primitive.h>
-#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -13,9 +9,12 @@
 #include "common/error.h"
 #include "common/parallel.h"
 #include "common/random.h"
+#include "tests/random_rays.h"
 
 namespace lumen {
 namespace {
+
+using test::Between;
 
 constexpr float kFar = 1e6f;  // mm
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -24,22 +23,9 @@ constexpr double kInfinity = std::numeric_limits<double>::infinity();
 // references below see the very triangles that Embree sees.
 double OnGrid(double x) { return std::round(x * 1024) / 1024; }
 
-double Between(double low, double high, uint64_t seed, uint64_t a, uint64_t b = 0) {
-  return low + (high - low) * UniformDouble(RandomBits(seed, a, b));
-}
-
 Mesh TriangleSoup(int faces) {
-  Mesh mesh;
-  for (int face = 0; face < faces; ++face) {
-    Vec3d middle;
-    for (int i = 0; i < 3; ++i) middle[i] = Between(-30, 30, 1, face, i);
-    for (int corner = 0; corner < 3; ++corner) {
-      Vec3d vertex;
-      for (int i = 0; i < 3; ++i) vertex[i] = OnGrid(middle[i] + Between(-4, 4, 2, face, 3 * corner + i));
-      mesh.vertices.push_back(vertex);
-    }
-    mesh.faces.push_back({3 * face, 3 * face + 1, 3 * face + 2});
-  }
+  Mesh mesh = test::TriangleSoup(faces, 4);
+  for (Vec3d& vertex : mesh.vertices) vertex = vertex.unaryExpr(&OnGrid);
   return mesh;
 }
 
@@ -80,9 +66,7 @@ struct Ray {
 std::vector<Ray> RandomRays(int count, uint64_t seed) {
   std::vector<Ray> rays(count);
   for (int i = 0; i < count; ++i) {
-    const double z = Between(-1, 1, seed, i), angle = Between(0, 2 * kPi, seed, i, 1);
-    const double across = std::sqrt(1 - z * z);
-    rays[i].direction = Vec3d(across * std::cos(angle), across * std::sin(angle), z).cast<float>();
+    rays[i].direction = test::RandomDirection(seed, i, 0);
     const Vec3d origin(Between(-5, 5, seed, i, 2), Between(-5, 5, seed, i, 3), Between(-38, 38, seed, i, 4));
     rays[i].origin = origin.cast<float>();
   }
@@ -122,40 +106,6 @@ Nearest BruteForce(const Mesh& mesh, const Vec3d& origin, const Vec3d& direction
   }
   return nearest;
 }
-
-// Which triangles a ray meets is decided by CGAL's exact predicates; how far they are, in double.
-class ExactScene {
- public:
-  explicit ExactScene(const Mesh& mesh) : mesh_(mesh) {
-    const auto point = [&](int i) {
-      const Vec3d& v = mesh.vertices[i];
-      return Kernel::Point_3(v.x(), v.y(), v.z());
-    };
-    for (const Vec3i& f : mesh.faces) triangles_.emplace_back(point(f[0]), point(f[1]), point(f[2]));
-    tree_.rebuild(triangles_.begin(), triangles_.end());
-  }
-
-  Nearest Intersect(const Vec3d& o, const Vec3d& d) const {
-    std::vector<Triangles::const_iterator> met;
-    const Kernel::Ray_3 ray(Kernel::Point_3(o.x(), o.y(), o.z()), Kernel::Vector_3(d.x(), d.y(), d.z()));
-    tree_.all_intersected_primitives(ray, std::back_inserter(met));
-    Nearest nearest;
-    for (const auto& triangle : met) {
-      const size_t face = triangle - triangles_.begin();
-      const double t = IntersectPlane(mesh_, face, o, d).t;
-      if (t < nearest.t) nearest = {static_cast<uint32_t>(face), t};
-    }
-    return nearest;
-  }
-
- private:
-  using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-  using Triangles = std::vector<Kernel::Triangle_3>;
-  using Primitive = CGAL::AABB_triangle_primitive<Kernel, Triangles::const_iterator>;
-  const Mesh& mesh_;
-  Triangles triangles_;
-  CGAL::AABB_tree<CGAL::AABB_traits<Kernel, Primitive>> tree_;
-};
 
 struct Comparison {
   int agree = 0;
@@ -198,16 +148,6 @@ TEST(RayScene, AgreesWithBruteForceInDouble) {
   for (const Mesh& mesh : {TriangleSoup(2000), ClosedTube(40, 30)}) {
     const RayScene scene(mesh);
     const auto reference = [&](const Vec3d& o, const Vec3d& d) { return BruteForce(mesh, o, d); };
-    ExpectSame(Compare(scene, mesh, rays, reference), rays.size());
-  }
-}
-
-TEST(RayScene, AgreesWithExactPredicates) {
-  const std::vector<Ray> rays = RandomRays(4000, 12);
-  for (const Mesh& mesh : {TriangleSoup(5000), ClosedTube(80, 60)}) {
-    const RayScene scene(mesh);
-    const ExactScene exact(mesh);
-    const auto reference = [&](const Vec3d& o, const Vec3d& d) { return exact.Intersect(o, d); };
     ExpectSame(Compare(scene, mesh, rays, reference), rays.size());
   }
 }

@@ -141,5 +141,50 @@ TEST(Sampler, MeanConvergesFasterThanIndependentNumbers) {
   EXPECT_LT(Error(OfPair, 64), Error(Independent, 64) / 8);
 }
 
+Vec2f IndependentPair(uint64_t seed, uint64_t pixel, uint32_t sample, uint32_t pair) {
+  return Sampler(seed, pixel, sample, Sampling::kIndependent).Pair(pair);
+}
+
+Points OfIndependentPair(uint64_t seed, uint64_t pixel, uint32_t first, uint32_t count, uint32_t pair) {
+  Points points;
+  for (uint32_t i = first; i < first + count; ++i) points.push_back(IndependentPair(seed, pixel, i, pair));
+  return points;
+}
+
+TEST(Sampler, IndependentNumbersAreIndependentFromSampleToSample) {
+  const double most = 255 + 5 * std::sqrt(510.0), least = 255 - 5 * std::sqrt(510.0);
+  const std::vector<std::function<Vec2f(int)>> uses = {
+      [](int i) { return IndependentPair(1, 7, i, 0); },
+      [](int i) { return IndependentPair(1, i, 3, 5); },
+      [](int i) { return Vec2f(IndependentPair(1, 7, i, 0).x(), IndependentPair(1, 7, i + 1, 0).x()); },
+      [](int i) { return Vec2f(IndependentPair(1, 7, i, 0).x(), IndependentPair(1, 7, i, 1).x()); },
+      [](int i) { return Vec2f(IndependentPair(1, i, 4, 0).x(), IndependentPair(1, i + 1, 4, 0).x()); },
+  };
+  for (size_t use = 0; use < uses.size(); ++use) {
+    EXPECT_LT(ChiSquare(uses[use], 65536), most) << use;
+    EXPECT_GT(ChiSquare(uses[use], 65536), least) << use;  // Sobol's would be far below
+  }
+  EXPECT_LT(ChiSquare([](int i) { return Sampler(1, 7, i).Pair(0); }, 65536), least);
+  const double order = std::log2(Error(OfIndependentPair, 16) / Error(OfIndependentPair, 1024)) / 6;
+  EXPECT_NEAR(order, 0.5, 0.1);
+}
+
+TEST(Sampler, LanesHaveTheSameNumbers) {
+  for (const Sampling sampling : {Sampling::kSobol, Sampling::kIndependent}) {
+    uint64_t pixels[kLanes];
+    for (int i = 0; i < kLanes; ++i) pixels[i] = (uint64_t{3} << 40) + 1000 * i;
+    const SamplerLanes lanes(9, pixels, sampling);
+    for (uint32_t pair : {0u, 5u, 0xfffffffeu}) {
+      LanesU samples;
+      for (int i = 0; i < kLanes; ++i) samples[i] = static_cast<uint32_t>(7 * i + pair);
+      Lanes u, v;
+      lanes.Pair(samples, pair, &u, &v);
+      for (int i = 0; i < kLanes; ++i) {
+        EXPECT_EQ(Vec2f(u[i], v[i]), Sampler(9, pixels[i], samples[i], sampling).Pair(pair));
+      }
+    }
+  }
+}
+
 }  // namespace
 }  // namespace lumen

@@ -18,23 +18,12 @@
 namespace lumen {
 namespace {
 
+using test::AddSquare;
 using test::ExpectAgree;
 using test::ExpectMean;
 using test::kBound;
 using test::Mean;
 using test::WithAlbedos;
-
-// A square in the plane z, its normal along ±z.
-void AddSquare(double half_mm, double z, bool up, Mesh* mesh) {
-  const int first = int(mesh->vertices.size());
-  for (const auto& [x, y] : {std::pair(-1, -1), {1, -1}, {1, 1}, {-1, 1}}) {
-    mesh->vertices.push_back({x * half_mm, y * half_mm, z});
-  }
-  for (const Vec3i& face : {Vec3i(0, 1, 2), Vec3i(0, 2, 3)}) {
-    const Vec3i turned = up ? face : Vec3i(face[0], face[2], face[1]);
-    mesh->faces.push_back(turned + Vec3i::Constant(first));
-  }
-}
 
 // Tissue below z = 0. Walks of the tests are a hundredth of its width at most.
 Mesh HalfSpace() {

@@ -1,4 +1,5 @@
-// Means with their standard errors, and tissue by its albedos: what the tests of subsurface scattering share.
+// Means with their standard errors, squares of wall, and tissue by its albedos: what the tests of subsurface
+// scattering share.
 #pragma once
 
 #include <gtest/gtest.h>
@@ -6,7 +7,10 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <utility>
+#include <vector>
 
+#include "common/mesh.h"
 #include "sim/imaging/subsurface.h"
 
 namespace lumen::test {
@@ -28,6 +32,12 @@ struct Mean {
   }
 };
 
+inline Mean MeanOf(const std::vector<double>& values) {
+  Mean mean;
+  for (const double value : values) mean.Add(value);
+  return mean;
+}
+
 inline void ExpectAgree(const Mean& a, const Mean& b) {
   EXPECT_LT(std::abs(a.value() - b.value()), kBound * std::hypot(a.error(), b.error()))
       << a.value() << " ± " << a.error() << " against " << b.value() << " ± " << b.error();
@@ -36,6 +46,18 @@ inline void ExpectAgree(const Mean& a, const Mean& b) {
 inline void ExpectMean(const Mean& mean, double expected) {
   EXPECT_LT(std::abs(mean.value() - expected), kBound * mean.error() + 1e-6)
       << mean.value() << " ± " << mean.error() << " against " << expected;
+}
+
+// A square in the plane z, its normal along ±z.
+inline void AddSquare(double half_mm, double z, bool up, Mesh* mesh) {
+  const int first = static_cast<int>(mesh->vertices.size());
+  for (const auto& [x, y] : {std::pair(-1, -1), {1, -1}, {1, 1}, {-1, 1}}) {
+    mesh->vertices.push_back({x * half_mm, y * half_mm, z});
+  }
+  for (const Vec3i& face : {Vec3i(0, 1, 2), Vec3i(0, 2, 3)}) {
+    const Vec3i turned = up ? face : Vec3i(face[0], face[2], face[1]);
+    mesh->faces.push_back(turned + Vec3i::Constant(first));
+  }
 }
 
 inline SubsurfaceOptions WithAlbedos(const Vec3d& albedos, const Vec3d& extinctions) {

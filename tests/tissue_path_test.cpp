@@ -15,36 +15,15 @@
 namespace lumen {
 namespace {
 
-constexpr double kBound = 4.5;  // standard errors: one in 300,000 estimates is further
-
-struct Estimate {
-  double value, error;
-};
-
-Estimate MeanOf(const std::vector<double>& values) {
-  double sum = 0, squares = 0;
-  for (const double value : values) {
-    sum += value;
-    squares += value * value;
-  }
-  const double count = double(values.size()), mean = sum / count;
-  return {mean, std::sqrt(std::max(0.0, squares / count - mean * mean) / count)};
-}
-
-void AddPlate(double half_mm, double z, bool up, Mesh* mesh) {
-  const int first = int(mesh->vertices.size());
-  for (const auto& [x, y] : {std::pair(-1, -1), {1, -1}, {1, 1}, {-1, 1}}) {
-    mesh->vertices.push_back({x * half_mm, y * half_mm, z});
-  }
-  for (const Vec3i& face : {Vec3i(0, 1, 2), Vec3i(0, 2, 3)}) {
-    mesh->faces.push_back((up ? face : Vec3i(face[0], face[2], face[1])) + Vec3i::Constant(first));
-  }
-}
+using test::AddSquare;
+using test::kBound;
+using test::Mean;
+using test::MeanOf;
 
 Mesh Plate(double thickness_mm = 0) {
   Mesh mesh;
-  AddPlate(300, 0, true, &mesh);
-  if (thickness_mm > 0) AddPlate(300, -thickness_mm, false, &mesh);
+  AddSquare(300, 0, true, &mesh);
+  if (thickness_mm > 0) AddSquare(300, -thickness_mm, false, &mesh);
   return mesh;
 }
 
@@ -85,14 +64,14 @@ struct Stage {
     return film;
   }
   // Of a channel, over the pixels, which are independent where they share no paths.
-  Estimate Radiance(int channel) const {
+  Mean Radiance(int channel) const {
     const Film film = Render(false);
     std::vector<double> values;
     for (size_t i = channel; i < film.radiance.data.size(); i += 3) values.push_back(film.radiance.data[i]);
     return MeanOf(values);
   }
   // Share of the light that comes back to places alike all over the wall.
-  Estimate Returns(int channel, int count) const {
+  Mean Returns(int channel, int count) const {
     std::vector<double> weights;
     int64_t rays = 0;
     for (int i = 0; i < count; ++i) {
@@ -112,9 +91,12 @@ struct Stage {
   }
 };
 
-void ExpectNear(const Estimate& found, double expected, double allowance = 0) {
-  EXPECT_LT(std::abs(found.value - expected), kBound * found.error + allowance)
-      << found.value << " ± " << found.error << " against " << expected;
+void ExpectNear(double found, double error, double expected, double allowance) {
+  EXPECT_LT(std::abs(found - expected), kBound * error + allowance)
+      << found << " ± " << error << " against " << expected;
+}
+void ExpectNear(const Mean& found, double expected, double allowance = 0) {
+  ExpectNear(found.value(), found.error(), expected, allowance);
 }
 
 // Lit evenly, an even wall of tissue looks like Lambert's with the albedo of the closed form, however its
@@ -146,12 +128,12 @@ TEST(TissuePath, LightComesThroughAFold) {
         stage.wall, {0, stage.wall.ToLocal(Vec3d(1, -3, 0)), Vec3f::UnitZ(), inward}, random, &rays);
     crossing.push_back(exit.normal[2] < 0 && exit.found ? exit.weight[0] : 0);
   }
-  const Estimate through = MeanOf(crossing), found = stage.Radiance(0);
-  EXPECT_GT(through.value, 0.1);
-  ExpectNear({found.value, std::hypot(found.error, 0.8 / kPi * through.error)}, 0.8 / kPi * through.value,
-             1e-4);
+  const Mean through = MeanOf(crossing), found = stage.Radiance(0);
+  EXPECT_GT(through.value(), 0.1);
+  ExpectNear(found.value(), std::hypot(found.error(), 0.8 / kPi * through.error()),
+             0.8 / kPi * through.value(), 1e-4);
   stage.surface.subsurface.reset();
-  EXPECT_EQ(stage.Radiance(0).value, 0);
+  EXPECT_EQ(stage.Radiance(0).value(), 0);
 }
 
 // In a sphere of tissue light is spread evenly by every bounce, as in a Lambertian one: what bounce k adds to
@@ -184,15 +166,16 @@ TEST(TissuePath, IntegratingSphere) {
       for (int c = 0; c < 3; ++c) added[c].push_back(sum[c]);
     }
     for (int c = 0; c < 3; ++c) {
-      const Estimate back = stage.Returns(c, 10000);
+      const Mean back = stage.Returns(c, 10000);
       double expected = 0, slope = 0;
       for (int k = 1; k <= kBounces; ++k) {
-        expected += std::pow(back.value, k + 1) * flux / area / kPi;
-        slope += (k + 1) * std::pow(back.value, k) * flux / area / kPi;
+        expected += std::pow(back.value(), k + 1) * flux / area / kPi;
+        slope += (k + 1) * std::pow(back.value(), k) * flux / area / kPi;
       }
-      const Estimate found = MeanOf(added[c]);
+      const Mean found = MeanOf(added[c]);
       // So few frames tell their own scatter to a fifth; triangles lie 0.1% within the sphere.
-      ExpectNear({found.value, 1.3 * std::hypot(found.error, slope * back.error)}, expected, 3e-3 * expected);
+      ExpectNear(found.value(), 1.3 * std::hypot(found.error(), slope * back.error()), expected,
+                 3e-3 * expected);
     }
   }
 }

@@ -5,6 +5,8 @@
 #include <optional>
 
 #include "sim/geometry/moving_wall.h"
+#include "sim/imaging/reference_path.h"
+#include "sim/metering.h"
 #include "sim/photographer.h"
 #include "sim/scene.h"
 
@@ -21,10 +23,17 @@ class FrameSetup {
 
   // The path tracer alone: linear radiance.
   ImageF Trace(const PathOptions& options, uint64_t seed, PathCount* count = nullptr) const;
-  // The scene's own path, lens and sensor.
+  // The plain path tracer, in float or double.
+  template <class T>
+  ImageF TracePlainly(const PathOptions& options, uint64_t seed) const {
+    return RenderReference<T>(path_scene_, ViewOfFrame(), options, seed, frame_);
+  }
+  // The scene's own path, lens and sensor, with the automatic gain's metering.
   Image8 Take(uint64_t seed) const;
 
  private:
+  View ViewOfFrame() const;
+
   const Scene& scene_;
   int frame_;
   PathScene path_scene_;
@@ -32,6 +41,7 @@ class FrameSetup {
   Image8 valid_;
   Photographer photographer_;
   std::optional<CameraMotion> motion_;
+  std::optional<Meter> meter_;
 };
 
 }  // namespace lumen

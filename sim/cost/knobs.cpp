@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "sim/imaging/reference_path.h"
+
 namespace lumen {
 namespace {
 
@@ -20,6 +22,39 @@ Knob NumberKnob(const std::string& name, bool biased, const PathOptions& own, st
     knob.settings.push_back(setting);
   }
   return knob;
+}
+
+bool SharesPaths(const PathOptions& options) { return options.bounces > 0 && options.shared_paths > 0; }
+
+Knob SamplerKnob(const PathOptions& own) {
+  Knob knob{"sampler", false, {}};
+  for (const auto& [name, sampling] :
+       {std::pair("sobol", Sampling::kSobol), {"independent", Sampling::kIndependent}}) {
+    knob.settings.push_back({name, own, 1, sampling == own.sampler});
+    knob.settings.back().options.sampler = sampling;
+  }
+  return knob;
+}
+
+// Rays in packets and one by one, each pixel with a path of its own; the scene's own setting, if its pixels
+// share paths, is a third.
+Knob PacketsKnob(const PathOptions& own) {
+  Knob knob{"packets", false, {}};
+  if (SharesPaths(own)) knob.settings.push_back({"16 shared", own, 1, true});
+  PathOptions alone = own;
+  alone.shared_paths = 0;
+  knob.settings.push_back({"16", alone, 1, !SharesPaths(own)});
+  knob.settings.push_back({"1", alone, 2, false, PathTracer::kSingleFloat});
+  return knob;
+}
+
+// Rays one by one in either precision, beside the scene's own: float, in packets.
+Knob PrecisionKnob(const PathOptions& own) {
+  return {"precision",
+          false,
+          {{"own", own, 1, true},
+           {"float", own, 2, false, PathTracer::kSingleFloat},
+           {"double", own, 2, false, PathTracer::kSingleDouble}}};
 }
 
 }  // namespace
@@ -43,6 +78,12 @@ std::vector<Knob> KnobsOf(const Scene& scene) {
     knobs.push_back(NumberKnob(
         "shared_paths", false, own, {0, 8, 16, 32, 64, 128}, own.shared_paths,
         [](int n, PathOptions* options) { options->shared_paths = n; }, [](int) { return 1.0; }));
+  }
+  knobs.push_back(SamplerKnob(own));
+  if (MissingInReference(scene.surface, scene.sensor.shutter.has_value(), scene.defocus.has_value())
+          .empty()) {
+    knobs.push_back(PacketsKnob(own));
+    knobs.push_back(PrecisionKnob(own));
   }
   knobs.push_back(NumberKnob(
       "bounces", true, own, {0, 1, 2, 3, 5, 8, 16}, own.bounces,
@@ -74,6 +115,7 @@ std::vector<EffectSwitch> SwitchesOf(const Scene& scene) {
       {"defocus", [](Scene* s) { s->defocus.reset(); }},
       {"chromatic_aberration", [](Scene* s) { s->chromatic_aberration.reset(); }},
       {"shutter", [](Scene* s) { s->sensor.shutter.reset(); }},
+      {"auto_gain", [](Scene* s) { s->sensor.auto_gain.reset(); }},
       {"sensor_noise", [](Scene* s) { s->sensor.noise.reset(); }},
       {"jpeg", [](Scene* s) { s->sensor.jpeg.reset(); }},
   };

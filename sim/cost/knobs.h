@@ -10,11 +10,15 @@
 
 namespace lumen {
 
+// Sixteen rays at a time, or one by one (reference_path.h).
+enum class PathTracer { kPackets, kSingleFloat, kSingleDouble };
+
 struct KnobSetting {
   std::string label;
   PathOptions options;
   double work = 1;      // a guess of its time, in units of the scene's own: what is too long is left out
   bool is_own = false;  // the scene's own setting
+  PathTracer tracer = PathTracer::kPackets;
 };
 
 struct Knob {

@@ -93,7 +93,7 @@ class CostMeasurement {
     std::vector<Luminance> runs;
     for (int run = 0; run < options_.runs; ++run) {
       ImageF radiance;
-      seconds.push_back(CpuSecondsOf([&] { radiance = setup_.Trace(setting.options, Seed(run)); }));
+      seconds.push_back(CpuSecondsOf([&] { radiance = Trace(setting, Seed(run)); }));
       runs.push_back(LuminanceOf(radiance, setup_.valid()));
     }
     CostPoint point;
@@ -153,6 +153,18 @@ class CostMeasurement {
     result_.effects.push_back({"peristalsis", MedianOf(seconds), MedianError(seconds)});
     result_.frame_seconds += MedianOf(seconds);
     result_.frame_seconds_error = std::hypot(result_.frame_seconds_error, MedianError(seconds));
+  }
+
+  ImageF Trace(const KnobSetting& setting, uint64_t seed) const {
+    switch (setting.tracer) {
+      case PathTracer::kSingleFloat:
+        return setup_.TracePlainly<float>(setting.options, seed);
+      case PathTracer::kSingleDouble:
+        return setup_.TracePlainly<double>(setting.options, seed);
+      case PathTracer::kPackets:
+        break;
+    }
+    return setup_.Trace(setting.options, seed);
   }
 
   Luminance Measure(const PathOptions& options, uint64_t seed) const {

@@ -32,7 +32,7 @@ struct SettingBias {
   Bias bias;
 };
 
-// The automatic gain's small pictures (1/64 of the pixels) and the mask are left out.
+// The mask is left out.
 struct EffectCost {
   std::string name;          // as in Scene::effects
   double seconds = 0;        // CPU seconds that a frame takes less without it

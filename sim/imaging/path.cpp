@@ -165,7 +165,7 @@ class Tracer {
   PlacesOf<kCoat> Entries(const HitPacket& hits, const PlacesOf<kCoat>& places, const TilePixels& pixels,
                           int block, int sample, PathCount* count) const {
     const auto sampler = [&](int i) {
-      return Sampler(seed_, PixelKey(pixels, block, i), static_cast<uint32_t>(sample));
+      return Sampler(seed_, PixelKey(pixels, block, i), static_cast<uint32_t>(sample), options_.sampler);
     };
     return walks_->Entries(hits, places, 0, sampler, &count->rays);
   }
@@ -263,7 +263,8 @@ class Tracer {
   // The endoscope when some rows, whose middle is given, are read out for a sample.
   Eye EyeAt(double row, uint64_t key, int sample) const {
     const double height = std::clamp(row / view_.valid->height, 0.0, 1.0);
-    const double random = Sampler(seed_, key, static_cast<uint32_t>(sample)).Pair(kTimePair)[0];
+    const double random =
+        Sampler(seed_, key, static_cast<uint32_t>(sample), options_.sampler).Pair(kTimePair)[0];
     return Eye(*scene_.wall, *view_.light, view_.motion->At(view_.motion->Time(height, random)), pinhole_);
   }
   Eye EyeOf(const TilePixels& pixels, int block, int sample) const {
@@ -278,7 +279,7 @@ class Tracer {
   SamplerLanes JitterOf(const TilePixels& pixels, int block) const {
     uint64_t keys[kLanes];
     for (int i = 0; i < kLanes; ++i) keys[i] = PixelKey(pixels, block, i);
-    return SamplerLanes(seed_, keys);
+    return SamplerLanes(seed_, keys, options_.sampler);
   }
 
   // The places that a block's pixels see.
@@ -353,7 +354,8 @@ class Tracer {
     start.weight = places.albedo;
     for (int i = 0; i < kLanes; ++i) {
       if (!places.alive[i]) continue;
-      const Sampler& sampler = start.samplers[i].emplace(seed_, PixelKey(pixels, block, i), sample);
+      const Sampler& sampler =
+          start.samplers[i].emplace(seed_, PixelKey(pixels, block, i), sample, options_.sampler);
       start.direction.Set(i, lambert::Sample(places.normal[i], sampler.Pair(kPairs.Direction(1))));
     }
     FarEnds<kCoat> ends = own_paths_.End(eye, start, kPairs, &count->rays);
@@ -373,7 +375,8 @@ class Tracer {
     start.origin = OffsetOrigin(places.point, places.normal);
     for (int i = 0; i < kLanes; ++i) {
       if (!places.alive[i]) continue;
-      const Sampler& sampler = start.samplers[i].emplace(seed_, PixelKey(pixels, block, i), sample);
+      const Sampler& sampler =
+          start.samplers[i].emplace(seed_, PixelKey(pixels, block, i), sample, options_.sampler);
       const Coat::Glint glint =
           places.coat->SampleGlint(places.lanes()[i], sampler.Pair(kPairs.Direction(1)));
       // Roulette: the light of those that look is as bright as its weight's root.

@@ -11,6 +11,7 @@
 #include "common/math.h"
 #include "common/ray_scene.h"
 #include "sim/imaging/defocus.h"
+#include "sim/imaging/sampler.h"
 #include "sim/imaging/shutter.h"
 #include "sim/imaging/surface.h"
 
@@ -21,6 +22,7 @@ struct PathOptions {
   int bounces = 0;         // from wall to wall; 0 = direct light only
   int roulette_after = 2;  // bounces that every path may make before Russian roulette
   int shared_paths = 16;   // that a tile's pixels share for each sample; 0 = a path for each pixel of its own
+  Sampling sampler = Sampling::kSobol;
 };
 
 // What there is to see. All of it is referred to.

@@ -1,6 +1,8 @@
 // Low-discrepancy numbers as a function of (seed, pixel, sample, dimension): the first two dimensions of
 // Sobol's sequence, Owen-scrambled by hashing and shuffled anew for every pair of dimensions (Burley 2020,
-// "Practical hash-based Owen scrambling"; the hash is Laine and Karras's).
+// "Practical hash-based Owen scrambling"; the hash is Laine and Karras's). Independent numbers, for
+// comparison, come of the same formula with a key for each sample in place of one for the pixel: the
+// scrambles are then unrelated from sample to sample, and what they make of any index is uniform.
 #pragma once
 
 #include <cstdint>
@@ -52,10 +54,14 @@ constexpr T SobolSecondReversed(T index) {
   return index ^ (index >> 16);
 }
 
+enum class Sampling { kSobol, kIndependent };
+
 class Sampler {
  public:
-  Sampler(uint64_t seed, uint64_t pixel, uint32_t sample)
-      : key_(Mix64(Mix64(seed) ^ pixel)), sample_(sample) {}
+  Sampler(uint64_t seed, uint64_t pixel, uint32_t sample, Sampling sampling = Sampling::kSobol)
+      : key_(Mix64(Mix64(seed) ^ pixel)), sample_(sample) {
+    if (sampling == Sampling::kIndependent) key_ = Mix64(key_ ^ sample);
+  }
 
   // Two numbers in [0, 1)² that, over the samples of a pixel, fill the square evenly. Each use of randomness
   // owns its pair.
@@ -82,14 +88,21 @@ class SamplerLanes {
  public:
   SamplerLanes() = default;
   // pixels: the second argument of each lane's Sampler.
-  SamplerLanes(uint64_t seed, const uint64_t pixels[kLanes]) {
+  SamplerLanes(uint64_t seed, const uint64_t pixels[kLanes], Sampling sampling = Sampling::kSobol)
+      : sampling_(sampling) {
     for (int i = 0; i < kLanes; ++i) (i < kLanes / 2 ? low_ : high_)[i % (kLanes / 2)] = pixels[i];
     low_ = MixEach64(low_ ^ Mix64(seed));
     high_ = MixEach64(high_ ^ Mix64(seed));
   }
 
   void Pair(const LanesU& samples, uint32_t pair, Lanes* u, Lanes* v) const {
-    const Keys low = MixEach64(low_ ^ uint64_t{pair}), high = MixEach64(high_ ^ uint64_t{pair});
+    Keys low = low_, high = high_;
+    if (sampling_ == Sampling::kIndependent) {
+      low = MixEach64(low ^ Widened(samples, 0));
+      high = MixEach64(high ^ Widened(samples, kLanes / 2));
+    }
+    low = MixEach64(low ^ uint64_t{pair});
+    high = MixEach64(high ^ uint64_t{pair});
     const LanesU index = OwenScramble(samples, LowBits(low, high));
     const Keys low_scrambles = MixEach64(low), high_scrambles = MixEach64(high);
     const LanesU x = ScrambleReversed(index, LowBits(low_scrambles, high_scrambles));
@@ -107,9 +120,16 @@ class SamplerLanes {
     const Half first = __builtin_convertvector(low, Half), second = __builtin_convertvector(high, Half);
     return __builtin_shufflevector(first, second, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
   }
+  // Eight lanes from the first given on.
+  static Keys Widened(const LanesU& samples, int first) {
+    Keys wide;
+    for (int i = 0; i < kLanes / 2; ++i) wide[i] = samples[first + i];
+    return wide;
+  }
   static Lanes ToUnit(const LanesU& bits) { return ToFloat((LanesI)(bits >> 8)) * 0x1p-24f; }
 
   Keys low_{}, high_{};
+  Sampling sampling_ = Sampling::kSobol;
 };
 
 }  // namespace lumen

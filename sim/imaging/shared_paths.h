@@ -25,7 +25,10 @@ template <bool kCoat>
 class SharedPaths {
  public:
   SharedPaths(const PathScene& scene, const PathOptions& options)
-      : wall_(*scene.wall), count_(options.shared_paths), paths_(scene, options) {}
+      : wall_(*scene.wall),
+        count_(options.shared_paths),
+        sampling_(options.sampler),
+        paths_(scene, options) {}
 
   // A path whose light is not finite is left out.
   struct Lost {
@@ -40,7 +43,7 @@ class SharedPaths {
     const Places places(*tile);
     if (places.count == 0) return;
     const int packets = (count_ * kPathsPerJoin + kLanes - 1) / kLanes;
-    const Sampler tile_sampler(seed, key ^ kTileNumbers, static_cast<uint32_t>(sample));
+    const Sampler tile_sampler(seed, key ^ kTileNumbers, static_cast<uint32_t>(sample), sampling_);
     std::vector<Packet> paths(static_cast<size_t>(packets));
     double whole = 0;
     for (int p = 0; p < packets; ++p) {
@@ -117,7 +120,7 @@ class SharedPaths {
     for (int i = 0; i < kLanes; ++i) {
       const int path = i * packets + packet;
       const Sampler& sampler =
-          start.samplers[i].emplace(seed, key, static_cast<uint32_t>(sample * all + path));
+          start.samplers[i].emplace(seed, key, static_cast<uint32_t>(sample * all + path), sampling_);
       const double pick = places.count * (path + double(sampler.Pair(kSourcePair)[0])) / all;
       source[i] = places.order[std::min(static_cast<int>(pick), places.count - 1)];
       const int block = source[i] / kLanes, lane = source[i] % kLanes;
@@ -179,6 +182,7 @@ class SharedPaths {
 
   const RayScene& wall_;
   const int count_;
+  const Sampling sampling_;
   BouncePaths<kCoat> paths_;
 };
 

@@ -1,0 +1,171 @@
+// The path tracer against the plain one, which shares neither packets nor its paths with it, and computes
+// places and light in double: direct light pixel by pixel, light between walls by Welch's test.
+#include "sim/imaging/reference_path.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <vector>
+
+#include "sim/ground_truth.h"
+#include "tests/path_stage.h"
+#include "tests/support.h"
+#include "tests/welch.h"
+
+namespace lumen::test {
+namespace {
+
+// A plate that throws shadows, in a tube or a sphere of 18 mm; three guides off the axis.
+Stage StageIn(Mesh mesh) {
+  AddPlate(&mesh, -4.3, 1.7, -3.1, 2.9, 9.1);
+  CameraIntrinsics intrinsics = CentredPinhole(48, 40, 22);
+  intrinsics.cx -= 0.27;  // no ray along an edge on purpose
+  intrinsics.cy += 0.39;
+  Stage stage(std::move(mesh), intrinsics);
+  stage.light.sources.clear();
+  for (const Vec3d& position : {Vec3d(3.24, 0.55, 0), Vec3d(-2.77, 2.66, 0), Vec3d(-1.27, -3.14, 0)}) {
+    stage.light.sources.push_back({position, Vec3d(0.1, -0.2, 1).normalized(), 1.3, Vec3d(300, 400, 500)});
+  }
+  stage.world_from_camera =
+      Eigen::Translation3d(2.1, -1.3, -3.7) * Eigen::AngleAxisd(0.21, Vec3d(1, 2, 0.5).normalized());
+  return stage;
+}
+
+View ViewOf(const Stage& stage, const Camera<float>& camera) {
+  return {&camera, &stage.valid, stage.world_from_camera, &stage.light};
+}
+
+template <class T>
+ImageF Plain(const Stage& stage, uint64_t seed) {
+  const Camera<float> camera(stage.intrinsics);
+  return RenderReference<T>({&stage.wall, &stage.surface, 0}, ViewOf(stage, camera), stage.options, seed, 0);
+}
+
+ImageF Fast(const Stage& stage, uint64_t seed) { return stage.Render(seed).radiance; }
+
+// How far direct light in float may be off, per channel. kRoundings rounded operations at most, each by u of
+// what it works on, lie between a pixel and the place that it sees, and as many between that and its light.
+// So the place is off by kRoundings · u · reach / c along the wall, reach being the largest length on the way
+// to it and c the cosine of the camera's ray; and light that goes with cos · exp(−spread (1 − D·L)) / d²
+// changes by (2 + spread) cos + 1 parts of exp / d² where the place moves by d.
+Vec3d DirectBound(const Stage& stage, const Vec3d& place, const Vec3d& normal) {
+  constexpr double kRoundings = 32, u = 0x1p-24;
+  const double reach =
+      place.norm() + stage.world_from_camera.translation().norm() + stage.mesh.vertices[0].norm();
+  const double shift = kRoundings * u * reach / std::abs(place.normalized().dot(normal));
+  Vec3d bound = Vec3d::Zero();
+  for (const LightSource& source : stage.light.sources) {
+    const double d = (place - source.position).norm();
+    const Vec3d L = (place - source.position) / d;
+    const double cosine = std::abs(L.dot(normal));
+    const double fall = std::exp(-source.spread * (1 - source.direction.dot(L))) / (d * d);
+    bound += fall / kPi * (((2 + source.spread) * cosine + 1) * shift / d + kRoundings * u) *
+             stage.surface.albedo.cwiseProduct(source.intensity);
+  }
+  return bound;
+}
+
+int PixelsOff(const Stage& stage, const ImageF& found, const ImageF& expected) {
+  const FrameTruth truth = ComputeTruth(stage.wall, Camera<double>(stage.intrinsics), stage.valid,
+                                        stage.world_from_camera, nullptr);
+  const Pose camera_from_world = stage.world_from_camera.inverse();
+  int off = 0;
+  for (int y = 0; y < found.height; ++y) {
+    for (int x = 0; x < found.width; ++x) {
+      const Vec3d bound =
+          DirectBound(stage, camera_from_world * PixelOf(truth.position, x, y), PixelOf(truth.normal, x, y));
+      off += ((PixelOf(found, x, y) - PixelOf(expected, x, y)).cwiseAbs() - bound).maxCoeff() > 0;
+    }
+  }
+  return off;
+}
+
+TEST(ReferencePath, DirectLightPixelByPixel) {
+  for (const Mesh& mesh : {Globe(18, 40), Tube(18, 40, 40, 60)}) {
+    Stage stage = StageIn(mesh);
+    const ImageF found = Fast(stage, 1);
+    const ImageF expected = Plain<double>(stage, 1);
+    // Where a ray meets an edge within rounding, some 1e-4 mm, or its light passes one, either answer is
+    // right: that is one in 2,000 of the 1,920 rays to triangles of 1 mm.
+    EXPECT_LE(PixelsOff(stage, found, expected), 6);
+    EXPECT_LE(PixelsOff(stage, Plain<float>(stage, 1), expected), 6);
+    stage.light.sources[0].position.z() += 0.01;  // mm
+    EXPECT_GT(PixelsOff(stage, found, Plain<double>(stage, 1)), 500);
+  }
+}
+
+constexpr int kBlock_px = 8;
+
+// Means of blocks by channel, over independent renders, and the variances of these means.
+struct BlockMeans {
+  std::vector<double> mean, variance;
+};
+
+constexpr int kRenders = 24;
+
+BlockMeans MeansOf(const std::function<ImageF(uint64_t)>& render) {
+  std::vector<double> sums, squares;
+  for (uint64_t seed = 0; seed < kRenders; ++seed) {
+    const ImageF image = render(seed);
+    const int columns = image.width / kBlock_px, rows = image.height / kBlock_px;
+    std::vector<double> blocks(size_t(columns) * rows * 3, 0);
+    for (int y = 0; y < rows * kBlock_px; ++y) {
+      for (int x = 0; x < columns * kBlock_px; ++x) {
+        const size_t block = size_t(y / kBlock_px) * columns + x / kBlock_px;
+        for (size_t c = 0; c < 3; ++c) blocks[3 * block + c] += image.Pixel(x, y)[c];
+      }
+    }
+    sums.resize(blocks.size());
+    squares.resize(blocks.size());
+    for (size_t i = 0; i < blocks.size(); ++i) {
+      sums[i] += blocks[i];
+      squares[i] += blocks[i] * blocks[i];
+    }
+  }
+  BlockMeans means;
+  for (size_t i = 0; i < sums.size(); ++i) {
+    means.mean.push_back(sums[i] / kRenders);
+    means.variance.push_back((squares[i] / kRenders - means.mean[i] * means.mean[i]) / (kRenders - 1));
+  }
+  return means;
+}
+
+int BlocksOff(const BlockMeans& a, const BlockMeans& b) {
+  const double count = static_cast<double>(a.mean.size()), each = SharedOut(1e-4, count);
+  int off = 0;
+  for (size_t i = 0; i < a.mean.size(); ++i) {
+    off += WelchChance(a.mean[i] - b.mean[i], a.variance[i], b.variance[i], kRenders) < each;
+  }
+  return off;
+}
+
+TEST(ReferencePath, LightBetweenWallsByBlocks) {
+  Stage stage = StageIn(Tube(18, 40, 20, 30));
+  stage.surface.mottling = Mottling{};
+  stage.surface.vessels = Vessels{};
+  stage.options = {16, 4, 1};
+  const BlockMeans plain = MeansOf([&](uint64_t seed) { return Plain<double>(stage, 1000 + seed); });
+  const BlockMeans single = MeansOf([&](uint64_t seed) { return Plain<float>(stage, 2000 + seed); });
+  EXPECT_EQ(BlocksOff(single, plain), 0);
+  for (const PathOptions& options : {PathOptions{16, 4, 1, 16}, PathOptions{16, 4, 1, 0},
+                                     PathOptions{16, 4, 1, 16, Sampling::kIndependent},
+                                     PathOptions{16, 4, 1, 0, Sampling::kIndependent}}) {
+    stage.options = options;
+    const BlockMeans fast = MeansOf([&](uint64_t seed) { return Fast(stage, seed); });
+    EXPECT_EQ(BlocksOff(fast, plain), 0) << options.shared_paths;
+  }
+  stage.options = {16, 4, 1, 16};
+  stage.surface.albedo *= 1.03;
+  const BlockMeans wrong = MeansOf([&](uint64_t seed) { return Fast(stage, seed); });
+  EXPECT_GT(BlocksOff(wrong, plain), 40);  // of 90
+}
+
+TEST(ReferencePath, RefusesWhatItDoesNotKnow) {
+  Stage stage = StageIn(Globe(18, 10));
+  stage.surface.coat = Coat({});
+  EXPECT_NE(ErrorOf([&] { Plain<double>(stage, 0); }).find("coat"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace lumen::test
