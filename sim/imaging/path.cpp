@@ -10,6 +10,7 @@
 #include "sim/imaging/bounce_paths.h"
 #include "sim/imaging/eye.h"
 #include "sim/imaging/guide_light.h"
+#include "sim/imaging/pixel_samples.h"
 #include "sim/imaging/places.h"
 #include "sim/imaging/sampler.h"
 #include "sim/imaging/shared_paths.h"
@@ -111,61 +112,82 @@ class Tracer {
   }
 
   void TraceDirect(const TilePixels& pixels, Film* film, PathCount* count) const {
-    ImageF& scattered = walks_ ? film->subsurface : film->direct;
+    // What moves is where it is at one moment for all of a packet.
+    const int each = view_.motion ? 1 : PixelSamples::EachOf(options_.samples);
     for (int block = 0; block < kBlocks; ++block) {
       if (!Any(pixels.on[block])) continue;
-      const SamplerLanes jitter = JitterOf(pixels, block);
-      double sums[kCoat ? 2 : 1][3][kLanes] = {};  // by lobe
-      int lost[kLanes] = {};
-      for (int sample = 0; sample < options_.samples; ++sample) {
-        LobesOf<kCoat> light{};
-        if (view_.motion) {
-          AddDirectOfBlock(EyeOf(pixels, block, sample), pixels, block, jitter, sample, &light, count);
-        } else {
-          AddDirectOfBlock(eye_, pixels, block, jitter, sample, &light, count);
-        }
-        const LanesI finite = IsFinite(Sum(light.Whole()));
-        if (Any(pixels.on[block] & ~finite)) {
-          for (int i = 0; i < kLanes; ++i) {
-            if (!pixels.on[block][i] || finite[i]) continue;
-            Note({1, pixels.X(block, i), pixels.Y(block, i), sample}, &count->failure);
-            ++lost[i];
-          }
-        }
-        Accumulate(Select(finite, light.base, Lanes3{}), sums[0]);
-        if constexpr (kCoat) Accumulate(Select(finite, light.glint, Lanes3{}), sums[1]);
+      for (int group = 0; group < each; ++group) {
+        TraceDirectGroup(pixels, block, each, group, film, count);
       }
       count->samples += int64_t{options_.samples} * Count(pixels.on[block]);
-      for (int i = 0; i < kLanes; ++i) {
-        if (!pixels.on[block][i] || lost[i] == options_.samples) continue;
-        const double share = 1.0 / (options_.samples - lost[i]);
-        const int x = pixels.X(block, i), y = pixels.Y(block, i);
-        for (int c = 0; c < 3; ++c) {
-          const double base = share * sums[0][c][i], glint = kCoat ? share * sums[kCoat][c][i] : 0;
-          film->radiance.Pixel(x, y)[c] = static_cast<float>(base + glint);
-          if (!scattered.empty()) scattered.Pixel(x, y)[c] = static_cast<float>(base);
-          if (!film->glint.empty()) film->glint.Pixel(x, y)[c] = static_cast<float>(glint);
+    }
+  }
+
+  // All samples of the pixels that share packets.
+  void TraceDirectGroup(const TilePixels& pixels, int block, int each, int group, Film* film,
+                        PathCount* count) const {
+    PixelSamples packet = SamplesOf(pixels, block, each, group);
+    if (!Any(packet.on)) return;
+    double sums[kCoat ? 2 : 1][3][kLanes] = {};  // by lobe
+    int lost[kLanes] = {};
+    for (int first = 0; first < options_.samples; first += each) {
+      LobesOf<kCoat> light{};
+      if (view_.motion) {
+        AddDirectOfPacket(EyeOf(pixels, block, first), packet, &light, count);
+      } else {
+        AddDirectOfPacket(eye_, packet, &light, count);
+      }
+      const LanesI finite = IsFinite(Sum(light.Whole()));
+      if (Any(packet.on & ~finite)) {
+        for (int i = 0; i < kLanes; ++i) {
+          if (!packet.on[i] || finite[i]) continue;
+          Note({1, pixels.X(block, packet.pixel[i]), pixels.Y(block, packet.pixel[i]),
+                static_cast<int>(packet.sample[i])},
+               &count->failure);
+          ++lost[i];
         }
+      }
+      Accumulate(Select(finite, light.base, Lanes3{}), sums[0]);
+      if constexpr (kCoat) Accumulate(Select(finite, light.glint, Lanes3{}), sums[1]);
+      packet.sample += static_cast<uint32_t>(each);
+    }
+    // A pixel's lanes lie as far apart as there are pixels.
+    const int group_pixels = kLanes / each;
+    for (int i = 0; i < group_pixels; ++i) {
+      if (!packet.on[i]) continue;
+      int kept = options_.samples;
+      for (int k = i; k < kLanes; k += group_pixels) kept -= lost[k];
+      if (kept == 0) continue;
+      const int x = pixels.X(block, packet.pixel[i]), y = pixels.Y(block, packet.pixel[i]);
+      for (int c = 0; c < 3; ++c) {
+        double mean[2] = {};
+        for (int lobe = 0; lobe < (kCoat ? 2 : 1); ++lobe) {
+          for (int k = i; k < kLanes; k += group_pixels) mean[lobe] += sums[lobe][c][k] / kept;
+        }
+        film->radiance.Pixel(x, y)[c] = static_cast<float>(mean[0] + mean[1]);
+        ImageF& scattered = walks_ ? film->subsurface : film->direct;
+        if (!scattered.empty()) scattered.Pixel(x, y)[c] = static_cast<float>(mean[0]);
+        if (!film->glint.empty()) film->glint.Pixel(x, y)[c] = static_cast<float>(mean[1]);
       }
     }
   }
 
-  void AddDirectOfBlock(const Eye& eye, const TilePixels& pixels, int block, const SamplerLanes& jitter,
-                        int sample, LobesOf<kCoat>* light, PathCount* count) const {
+  void AddDirectOfPacket(const Eye& eye, const PixelSamples& packet, LobesOf<kCoat>* light,
+                         PathCount* count) const {
     HitPacket hits;
-    const PlacesOf<kCoat> places = Look(eye, pixels, block, jitter, sample, &hits, count);
+    const PlacesOf<kCoat> places = Look(eye, packet, &hits, count);
     if (kCoat || !walks_) AddDirect(eye, places, true, light, count);
     if (!walks_) return;
     LobesOf<kCoat> scattered{};
-    AddDirect(eye, Entries(hits, places, pixels, block, sample, count), false, &scattered, count);
+    AddDirect(eye, Entries(hits, places, packet, count), false, &scattered, count);
     light->base = scattered.base;
   }
 
   // Where what is seen of tissue came in.
-  PlacesOf<kCoat> Entries(const HitPacket& hits, const PlacesOf<kCoat>& places, const TilePixels& pixels,
-                          int block, int sample, PathCount* count) const {
+  PlacesOf<kCoat> Entries(const HitPacket& hits, const PlacesOf<kCoat>& places, const PixelSamples& packet,
+                          PathCount* count) const {
     const auto sampler = [&](int i) {
-      return Sampler(seed_, PixelKey(pixels, block, i), static_cast<uint32_t>(sample), options_.sampler);
+      return Sampler(seed_, packet.key[i], packet.sample[i], options_.sampler);
     };
     return walks_->Entries(hits, places, 0, sampler, &count->rays);
   }
@@ -205,18 +227,20 @@ class Tracer {
   void TraceIndirectBlock(const Eye& eye, const TilePixels& pixels, int block, int sample,
                           TileSample<kCoat>* tile, PathCount* count) const {
     HitPacket hits;
-    tile->places[block] = Look(eye, pixels, block, JitterOf(pixels, block), sample, &hits, count);
+    PixelSamples packet = SamplesOf(pixels, block, 1, 0);
+    packet.sample += static_cast<uint32_t>(sample);
+    tile->places[block] = Look(eye, packet, &hits, count);
     if (walks_) {
       // The coat mirrors its light where the pixels look, before the places are those where light comes in.
       if constexpr (kCoat) {
-        AddGlintPaths(eye, pixels, block, sample, tile, count);
+        AddGlintPaths(eye, packet, block, tile, count);
         tile->mirrored[block] = std::exchange(tile->indirect[block], Lanes3{});
       }
-      tile->places[block] = Entries(hits, tile->places[block], pixels, block, sample, count);
+      tile->places[block] = Entries(hits, tile->places[block], packet, count);
     }
-    if (options_.shared_paths == 0) AddOwnPaths(eye, pixels, block, sample, tile, count);
+    if (options_.shared_paths == 0) AddOwnPaths(eye, packet, block, tile, count);
     if constexpr (kCoat) {
-      if (!walks_) AddGlintPaths(eye, pixels, block, sample, tile, count);
+      if (!walks_) AddGlintPaths(eye, packet, block, tile, count);
     }
   }
 
@@ -268,36 +292,35 @@ class Tracer {
     return Eye(*scene_.wall, *view_.light, view_.motion->At(view_.motion->Time(height, random)), pinhole_);
   }
   Eye EyeOf(const TilePixels& pixels, int block, int sample) const {
-    return EyeAt(pixels.Y(block, 0) + kBlockEdge / 2, PixelKey(pixels, block, 0), sample);
+    return EyeAt(pixels.Y(block, 0) + kBlockEdge / 2, PixelKey(pixels.X(block, 0), pixels.Y(block, 0)),
+                 sample);
   }
 
-  uint64_t PixelKey(const TilePixels& pixels, int block, int lane) const {
-    return (frame_ << 40) ^ (static_cast<uint64_t>(pixels.Y(block, lane)) * view_.valid->width +
-                             static_cast<uint64_t>(pixels.X(block, lane)));
+  uint64_t PixelKey(int x, int y) const {
+    return (frame_ << 40) ^ (static_cast<uint64_t>(y) * view_.valid->width + static_cast<uint64_t>(x));
   }
 
-  SamplerLanes JitterOf(const TilePixels& pixels, int block) const {
-    uint64_t keys[kLanes];
-    for (int i = 0; i < kLanes; ++i) keys[i] = PixelKey(pixels, block, i);
-    return SamplerLanes(seed_, keys, options_.sampler);
+  PixelSamples SamplesOf(const TilePixels& pixels, int block, int each, int group) const {
+    return PixelSamples(
+        pixels, block, each, group, [&](int x, int y) { return PixelKey(x, y); },
+        [&](const uint64_t* keys) { return SamplerLanes(seed_, keys, options_.sampler); });
   }
 
-  // The places that a block's pixels see.
-  PlacesOf<kCoat> Look(const Eye& eye, const TilePixels& pixels, int block, const SamplerLanes& jitter,
-                       int sample, HitPacket* hits, PathCount* count) const {
-    Lanes x = pixels.x[block], y = pixels.y[block];
+  // The places that are seen.
+  PlacesOf<kCoat> Look(const Eye& eye, const PixelSamples& packet, HitPacket* hits, PathCount* count) const {
+    Lanes x = packet.x, y = packet.y;
     if (options_.samples > 1) {
       Lanes u, v;
-      jitter.Pair(BroadcastU(static_cast<uint32_t>(sample)), kPixelPair, &u, &v);
+      packet.sampler.Pair(packet.sample, kPixelPair, &u, &v);
       x += u - 0.5f;
       y += v - 0.5f;
     }
     Lanes3 in_camera;
-    const LanesI seen = view_.camera->Unproject(x, y, &in_camera) & pixels.on[block];
+    const LanesI seen = view_.camera->Unproject(x, y, &in_camera) & packet.on;
     RayPacket rays;
     Store3(Broadcast(eye.origin), rays.origin);
     if (!pinhole_) {
-      const Lanes3 on_aperture = PassLens(jitter, sample, &in_camera);
+      const Lanes3 on_aperture = PassLens(packet, &in_camera);
       Store3(Broadcast(eye.origin) + Rotated(eye.rotation, on_aperture), rays.origin);
     }
     Store3(Rotated(eye.rotation, in_camera), rays.direction);
@@ -314,9 +337,9 @@ class Tracer {
   }
 
   // Turns directions to those of rays from places on the aperture, which are returned; camera axes.
-  Lanes3 PassLens(const SamplerLanes& jitter, int sample, Lanes3* direction) const {
+  Lanes3 PassLens(const PixelSamples& packet, Lanes3* direction) const {
     Lanes u, v;
-    jitter.Pair(BroadcastU(static_cast<uint32_t>(sample)), kLensPair, &u, &v);
+    packet.sampler.Pair(packet.sample, kLensPair, &u, &v);
     Lanes3 origin;
     for (int i = 0; i < kLanes; ++i) {
       const LensRay ray = ThroughLens(*view_.defocus, (*direction)[i], Vec2f(u[i], v[i]));
@@ -344,7 +367,7 @@ class Tracer {
   }
 
   // Light that the wall scatters, by a bounce path for each pixel.
-  void AddOwnPaths(const Eye& eye, const TilePixels& pixels, int block, int sample, TileSample<kCoat>* tile,
+  void AddOwnPaths(const Eye& eye, const PixelSamples& packet, int block, TileSample<kCoat>* tile,
                    PathCount* count) const {
     constexpr BouncePairs kPairs(kOwnPairs);
     const auto& places = tile->places[block];
@@ -355,7 +378,7 @@ class Tracer {
     for (int i = 0; i < kLanes; ++i) {
       if (!places.alive[i]) continue;
       const Sampler& sampler =
-          start.samplers[i].emplace(seed_, PixelKey(pixels, block, i), sample, options_.sampler);
+          start.samplers[i].emplace(seed_, packet.key[i], packet.sample[i], options_.sampler);
       start.direction.Set(i, lambert::Sample(places.normal[i], sampler.Pair(kPairs.Direction(1))));
     }
     FarEnds<kCoat> ends = own_paths_.End(eye, start, kPairs, &count->rays);
@@ -367,7 +390,7 @@ class Tracer {
 
   // Light that the coat mirrors: its lobe is too narrow for paths that come to it from elsewhere, and sends
   // on so little that only some of the pixels look.
-  void AddGlintPaths(const Eye& eye, const TilePixels& pixels, int block, int sample, TileSample<true>* tile,
+  void AddGlintPaths(const Eye& eye, const PixelSamples& packet, int block, TileSample<true>* tile,
                      PathCount* count) const {
     constexpr BouncePairs kPairs(kGlintPairs);
     const CoatedPlaces& places = tile->places[block];
@@ -376,7 +399,7 @@ class Tracer {
     for (int i = 0; i < kLanes; ++i) {
       if (!places.alive[i]) continue;
       const Sampler& sampler =
-          start.samplers[i].emplace(seed_, PixelKey(pixels, block, i), sample, options_.sampler);
+          start.samplers[i].emplace(seed_, packet.key[i], packet.sample[i], options_.sampler);
       const Coat::Glint glint =
           places.coat->SampleGlint(places.lanes()[i], sampler.Pair(kPairs.Direction(1)));
       // Roulette: the light of those that look is as bright as its weight's root.

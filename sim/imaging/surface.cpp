@@ -68,14 +68,9 @@ struct Cells {
     offset = {point.x - ToFloat(x), point.y - ToFloat(y), point.z - ToFloat(z)};
     one = !Any((x ^ x[0]) | (y ^ y[0]) | (z ^ z[0]));
   }
-  Lanes3 Offset(int dx, int dy, int dz) const {
-    return {offset.x - static_cast<float>(dx), offset.y - static_cast<float>(dy),
-            offset.z - static_cast<float>(dz)};
-  }
-  // Gradients of a corner. Rays of neighbouring pixels mostly meet one cell: then it is looked up once.
-  Lanes3 Slopes(uint32_t seed, int dx, int dy, int dz) const {
-    if (one) return Broadcast(kSlopes[LatticeHash(seed, x[0] + dx, y[0] + dy, z[0] + dz) % kLanes]);
-    return SlopesOf(LatticeHash(seed, x + dx, y + dy, z + dz));
+  Lanes3 Offset(int corner) const {
+    return {offset.x - static_cast<float>(corner & 1), offset.y - static_cast<float>(corner >> 1 & 1),
+            offset.z - static_cast<float>(corner >> 2)};
   }
 
   LanesI x, y, z;
@@ -83,17 +78,75 @@ struct Cells {
   bool one;
 };
 
-Lanes Noise(uint32_t seed, const Lanes3& point) {
-  const Cells cells(point);
-  Lanes corners[8];
-  for (int i = 0; i < 8; ++i) {
-    const int dx = i & 1, dy = i >> 1 & 1, dz = i >> 2;
-    corners[i] = Dot(cells.Slopes(seed, dx, dy, dz), cells.Offset(dx, dy, dz));
+// Gradients of the eight corners of each lane's cell: corner i lies (i & 1, i >> 1 & 1, i >> 2) on from the
+// lowest.
+class ManyCells {
+ public:
+  ManyCells(uint32_t seed, const Cells& cells) : seed_(seed), cells_(cells) {}
+  Lanes3 operator[](int corner) const {
+    return SlopesOf(
+        LatticeHash(seed_, cells_.x + (corner & 1), cells_.y + (corner >> 1 & 1), cells_.z + (corner >> 2)));
   }
+
+ private:
+  const uint32_t seed_;
+  const Cells& cells_;
+};
+
+// The same where all lanes lie in one cell, as those of one pixel's rays mostly do: its corners are looked up
+// at once, a lane for each.
+class OneCell {
+ public:
+  OneCell(uint32_t seed, const Cells& cells) {
+    constexpr LanesI kCorner = {0, 1, 2, 3, 4, 5, 6, 7};
+    Store3(SlopesOf(LatticeHash(seed, cells.x[0] + (kCorner & 1), cells.y[0] + (kCorner >> 1 & 1),
+                                cells.z[0] + (kCorner >> 2))),
+           slopes_);
+  }
+  Lanes3 operator[](int corner) const {
+    return {Broadcast(slopes_[0][corner]), Broadcast(slopes_[1][corner]), Broadcast(slopes_[2][corner])};
+  }
+
+ private:
+  alignas(64) float slopes_[3][kLanes];
+};
+
+template <class Slopes>
+Lanes NoiseIn(const Cells& cells, const Slopes& slopes) {
+  Lanes corners[8];
+  for (int i = 0; i < 8; ++i) corners[i] = Dot(slopes[i], cells.Offset(i));
   const Lanes u = Quintic(cells.offset.x), v = Quintic(cells.offset.y), w = Quintic(cells.offset.z);
   const Lanes low = Lerp(Lerp(corners[0], corners[1], u), Lerp(corners[2], corners[3], u), v);
   const Lanes high = Lerp(Lerp(corners[4], corners[5], u), Lerp(corners[6], corners[7], u), v);
   return Min(Max(Lerp(low, high, w), Broadcast(-1)), Broadcast(1));
+}
+
+Lanes Noise(uint32_t seed, const Lanes3& point) {
+  const Cells cells(point);
+  return cells.one ? NoiseIn(cells, OneCell(seed, cells)) : NoiseIn(cells, ManyCells(seed, cells));
+}
+
+template <class Slopes>
+Lanes3 NoiseGradientIn(const Cells& cells, const Slopes& corner_slopes) {
+  const Lanes3& t = cells.offset;
+  const auto slope_of_quintic = [](const Lanes& t) { return 30.0f * t * t * (t - 1.0f) * (t - 1.0f); };
+  const Lanes3 weight = {Quintic(t.x), Quintic(t.y), Quintic(t.z)};
+  const Lanes3 steepness = {slope_of_quintic(t.x), slope_of_quintic(t.y), slope_of_quintic(t.z)};
+  Lanes3 gradient{};
+  for (int i = 0; i < 8; ++i) {
+    const int dx = i & 1, dy = i >> 1 & 1, dz = i >> 2;
+    const Lanes3 slopes = corner_slopes[i];
+    const Lanes value = Dot(slopes, cells.Offset(i));
+    const Lanes3 share = {dx ? weight.x : 1.0f - weight.x, dy ? weight.y : 1.0f - weight.y,
+                          dz ? weight.z : 1.0f - weight.z};
+    const Lanes3 growth = {dx ? steepness.x : -steepness.x, dy ? steepness.y : -steepness.y,
+                           dz ? steepness.z : -steepness.z};
+    gradient =
+        gradient + slopes * (share.x * share.y * share.z) +
+        Lanes3{growth.x * share.y * share.z, share.x * growth.y * share.z, share.x * share.y * growth.z} *
+            value;
+  }
+  return gradient;
 }
 
 // Two octaves, scaled to stay within ±1: the noise in clouds.
@@ -163,25 +216,8 @@ Lanes GradientNoise(uint64_t seed, const Lanes3& points) { return Noise(NoiseSee
 Lanes3 NoiseGradient(uint64_t seed, const Lanes3& points) {
   const uint32_t noise_seed = NoiseSeed(seed);
   const Cells cells(points);
-  const Lanes3& t = cells.offset;
-  const auto slope_of_quintic = [](const Lanes& t) { return 30.0f * t * t * (t - 1.0f) * (t - 1.0f); };
-  const Lanes3 weight = {Quintic(t.x), Quintic(t.y), Quintic(t.z)};
-  const Lanes3 steepness = {slope_of_quintic(t.x), slope_of_quintic(t.y), slope_of_quintic(t.z)};
-  Lanes3 gradient{};
-  for (int i = 0; i < 8; ++i) {
-    const int dx = i & 1, dy = i >> 1 & 1, dz = i >> 2;
-    const Lanes3 slopes = cells.Slopes(noise_seed, dx, dy, dz);
-    const Lanes value = Dot(slopes, cells.Offset(dx, dy, dz));
-    const Lanes3 share = {dx ? weight.x : 1.0f - weight.x, dy ? weight.y : 1.0f - weight.y,
-                          dz ? weight.z : 1.0f - weight.z};
-    const Lanes3 growth = {dx ? steepness.x : -steepness.x, dy ? steepness.y : -steepness.y,
-                           dz ? steepness.z : -steepness.z};
-    gradient =
-        gradient + slopes * (share.x * share.y * share.z) +
-        Lanes3{growth.x * share.y * share.z, share.x * growth.y * share.z, share.x * share.y * growth.z} *
-            value;
-  }
-  return gradient;
+  return cells.one ? NoiseGradientIn(cells, OneCell(noise_seed, cells))
+                   : NoiseGradientIn(cells, ManyCells(noise_seed, cells));
 }
 
 Lanes3 AlbedoAt(const Surface& surface, uint64_t seed, const Lanes3& places_mm) {
