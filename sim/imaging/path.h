@@ -20,7 +20,7 @@ namespace lumen {
 struct PathOptions {
   int samples = 8;         // a pixel
   int bounces = 0;         // from wall to wall; 0 = direct light only
-  int roulette_after = 2;  // bounces that every path may make before Russian roulette
+  int roulette_after = 8;  // bounces that every path may make before Russian roulette
   int shared_paths = 16;   // that a tile's pixels share for each sample; 0 = a path for each pixel of its own
   Sampling sampler = Sampling::kSobol;
 };
