@@ -11,6 +11,7 @@
 #include "common/parallel.h"
 #include "common/progress.h"
 #include "recon/training/checkpoint.h"
+#include "recon/training/estimate.h"
 #include "tests/small_sequence.h"
 
 namespace lumen {
@@ -103,6 +104,35 @@ TEST(TrainOptions, AreReadBackFromTheirText) {
   EXPECT_NE(misspelt.find("eikonal"), std::string::npos) << misspelt;
   const std::string no_preset = test::ErrorOf([] { ReadTrainOptions("slow", {}); });
   EXPECT_NE(no_preset.find("fast"), std::string::npos) << no_preset;
+}
+
+// The size of everything that is learnt follows from the shapes alone.
+TEST(Train, DryRunCountsMeasuresAndLeavesNoFile) {
+  const ScratchFolder folder;
+  const TrainOptions options =
+      ReadTrainOptions("paper", {"network.sdf_hidden=[60]", "network.sdf_skip=0", "network.color_hidden=[7]",
+                                 "network.features=5", "sampling.rays=8", "schedule.iterations=1000"});
+  EstimateOptions how;
+  how.seconds = 0;
+  const auto before = std::filesystem::last_write_time(SmallSequence().folder);
+  const TrainEstimate estimate = EstimateTraining(SmallSequence(), options, how);
+  const int sdf = 39 * 60 + 60 + 60 * 6 + 6, color = (3 + 27 + 3 + 5) * 7 + 7 + 7 * 3 + 3;
+  EXPECT_EQ(estimate.network_parameters, sdf + color + 60 + 6 + 7 + 3);  // with a length a row
+  EXPECT_EQ(estimate.parameters, estimate.network_parameters);
+  EXPECT_EQ(estimate.samples_per_iteration, 8 * 128);
+  EXPECT_EQ(estimate.frames, 6);
+  EXPECT_EQ(estimate.measured_iterations, 2);
+  EXPECT_GT(estimate.seconds_per_iteration, 0);
+  EXPECT_DOUBLE_EQ(estimate.seconds, 1000 * estimate.seconds_per_iteration);
+  EXPECT_GT(estimate.resident_bytes, estimate.state_bytes);
+  const int status =
+      std::system((std::string(LUMEN_COMMAND) + " train " + SmallSequence().folder.string() +
+                   " --dry-run --iterations 7 --json " + (folder / "cost.json").string() + " >/dev/null")
+                      .c_str());
+  ASSERT_EQ(status, 0);
+  EXPECT_NE(ReadFile(folder / "cost.json").find("\"iterations\": 7"), std::string::npos);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
+  EXPECT_EQ(std::filesystem::last_write_time(SmallSequence().folder), before);
 }
 
 TEST(Checkpoint, DamageIsRefused) {

@@ -1,21 +1,65 @@
+#include <fmt/core.h>
+
 #include <iostream>
 
+#include "common/error.h"
 #include "common/sequence.h"
+#include "recon/training/estimate.h"
 #include "tools/options.h"
 #include "tools/train_arguments.h"
 
 namespace lumen {
+namespace {
+
+// "5.2 s", "3.1 h", "17.4 days".
+std::string Duration(double seconds) {
+  if (seconds < 120) return fmt::format("{:.3g} s", seconds);
+  if (seconds < 7200) return fmt::format("{:.3g} min", seconds / 60);
+  if (seconds < 172800) return fmt::format("{:.3g} h", seconds / 3600);
+  return fmt::format("{:.3g} days", seconds / 86400);
+}
+
+nlohmann::json Estimate(const Sequence& sequence, const TrainOptions& options, uint64_t seed) {
+  EstimateOptions how;
+  how.seed = seed;
+  const TrainEstimate estimate = EstimateTraining(sequence, options, how);
+  constexpr double kMegabyte = 1e6;
+  fmt::print("parameters     {} ({} of them the networks')\n", estimate.parameters,
+             estimate.network_parameters);
+  fmt::print("an iteration   {} rays × {} samples = {}\n", options.sampling.rays, options.sampling.PerRay(),
+             estimate.samples_per_iteration);
+  fmt::print("memory         {:.0f} MB, of which {:.1f} MB parameters, gradient and moments; {} frames\n",
+             static_cast<double>(estimate.resident_bytes) / kMegabyte,
+             static_cast<double>(estimate.state_bytes) / kMegabyte, estimate.frames);
+  fmt::print("seconds        {:.4g} an iteration (median of {})\n", estimate.seconds_per_iteration,
+             estimate.measured_iterations);
+  fmt::print("the whole run  {} iterations, {}\n", estimate.iterations, Duration(estimate.seconds));
+  return {{"parameters", estimate.parameters},
+          {"network_parameters", estimate.network_parameters},
+          {"frames", estimate.frames},
+          {"samples_per_iteration", estimate.samples_per_iteration},
+          {"state_bytes", estimate.state_bytes},
+          {"resident_bytes", estimate.resident_bytes},
+          {"measured_iterations", estimate.measured_iterations},
+          {"seconds_per_iteration", estimate.seconds_per_iteration},
+          {"iterations", estimate.iterations},
+          {"seconds", estimate.seconds}};
+}
+
+}  // namespace
 
 void AddTrain(CLI::App* app) {
   struct Arguments {
     std::filesystem::path sequence, run;
     TrainArguments train;
-    bool resume = false;
+    bool resume = false, dry_run = false;
   };
   auto arguments = std::make_shared<Arguments>();
   auto* command =
       AddSubcommand(app, "train", "reconstructs a sequence", [arguments](const CommonOptions& common) {
         const TrainOptions options = ReadTrainOptions(arguments->train.preset, arguments->train.Settings());
+        if (arguments->dry_run) return Estimate(ReadSequence(arguments->sequence), options, common.seed);
+        if (arguments->run.empty()) throw InputError("-o: a run needs a folder; or say --dry-run");
         TrainRun run;
         run.folder = arguments->run;
         run.seed = common.seed;
@@ -26,9 +70,11 @@ void AddTrain(CLI::App* app) {
         return ToJson(result);
       });
   command->add_option("sequence", arguments->sequence, "sequence folder")->required();
-  command->add_option("-o", arguments->run, "folder of the run")->required();
+  command->add_option("-o", arguments->run, "folder of the run; a dry run needs none");
   AddTrainArguments(command, &arguments->train);
   command->add_flag("--resume", arguments->resume, "go on from the folder's checkpoint");
+  command->add_flag("--dry-run", arguments->dry_run,
+                    "measure some iterations and say what the whole run would cost here; write nothing");
 }
 
 }  // namespace lumen
