@@ -6,5 +6,6 @@
 namespace lumen {
 
 void AddCostRender(CLI::App* cost);
+void AddCostTrain(CLI::App* cost);
 
 }  // namespace lumen

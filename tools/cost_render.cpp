@@ -9,6 +9,7 @@
 #include "sim/cost/render_cost.h"
 #include "tools/cost.h"
 #include "tools/options.h"
+#include "tools/scaled_scene.h"
 
 namespace lumen {
 namespace {
@@ -21,29 +22,6 @@ struct Arguments {
   double scale = 1;
   RenderCostOptions options;
 };
-
-Scene ReadScaled(const Arguments& arguments, uint64_t seed) {
-  Scene scene = ReadScene(arguments.scene, arguments.settings, seed);
-  if (arguments.scale == 1) return scene;
-  const CameraIntrinsics& camera = scene.calibration.camera;
-  const auto scaled = [&](int size) {
-    return std::max(1, static_cast<int>(std::lround(arguments.scale * size)));
-  };
-  const int width = scaled(camera.width), height = scaled(camera.height);
-  const Image8& mask = scene.calibration.mask;
-  if (!mask.empty()) {
-    Image8 smaller(width, height, 1);
-    for (int y = 0; y < height; ++y) {
-      for (int x = 0; x < width; ++x) {  // as the mask's pixel at its middle
-        *smaller.Pixel(x, y) = *mask.Pixel(static_cast<int>((x + 0.5) * mask.width / width),
-                                           static_cast<int>((y + 0.5) * mask.height / height));
-      }
-    }
-    scene.calibration.mask = smaller;
-  }
-  scene.calibration.camera = Resized(camera, width, height);
-  return scene;
-}
 
 double Percent(double part) { return 100 * part; }
 
@@ -176,7 +154,8 @@ nlohmann::json ToJson(const RenderCost& cost) {
 nlohmann::json Run(const Arguments& arguments, const CommonOptions& common) {
   RenderCostOptions options = arguments.options;
   options.seed = common.seed;
-  const RenderCost cost = MeasureRenderCost(ReadScaled(arguments, common.seed), options);
+  const RenderCost cost = MeasureRenderCost(
+      ReadScaledScene(arguments.scene, arguments.settings, common.seed, arguments.scale), options);
   fmt::print("frame {} of {}: {}×{} pixels, {} triangles\n", options.frame, arguments.scene.string(),
              cost.width, cost.height, cost.triangles);
   fmt::print("{}{}{}", CurvesTable(cost, cost.sampling, cost.sampling_reference),

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 namespace lumen {
 namespace {
@@ -20,20 +19,6 @@ double Seconds(clockid_t clock) {
 double CpuSeconds() { return Seconds(CLOCK_PROCESS_CPUTIME_ID); }
 
 double WallSeconds() { return Seconds(CLOCK_MONOTONIC); }
-
-double MedianOf(std::vector<double> values) {
-  std::ranges::sort(values);
-  const size_t n = values.size();
-  return n % 2 ? values[n / 2] : (values[n / 2 - 1] + values[n / 2]) / 2;
-}
-
-double HalfRange(const std::vector<double>& values) {
-  if (std::ranges::any_of(values, [](double v) { return std::isnan(v); })) {
-    return std::numeric_limits<double>::quiet_NaN();
-  }
-  const auto [low, high] = std::ranges::minmax(values);
-  return (high - low) / 2;
-}
 
 double MedianError(std::vector<double> values) {
   std::ranges::sort(values);

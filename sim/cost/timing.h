@@ -3,6 +3,8 @@
 
 #include <vector>
 
+#include "common/statistics.h"
+
 namespace lumen {
 
 // That the process has spent on all its threads.
@@ -18,9 +20,6 @@ double CpuSecondsOf(const Body& body) {
   return CpuSeconds() - start;
 }
 
-double MedianOf(std::vector<double> values);
-// NaN where one of them is.
-double HalfRange(const std::vector<double>& values);
 // Of their median, from the interquartile range, as interruptions make the tails long: 1.253 σ/√n (for a
 // normal distribution, as the next), σ being 0.741 of that range.
 double MedianError(std::vector<double> values);
