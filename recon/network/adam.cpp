@@ -10,6 +10,12 @@ namespace {
 // hash tables with their tiny gradients need it (Müller et al. 2022).
 constexpr float kEpsilon = 1e-15f;
 
+// Below these a moment counts as 0: the first moves a parameter by less than rate · 10⁻³⁰/kEpsilon, the root
+// of the second is a thousandth of kEpsilon. Entries of the tables that no ray has met for some hundred steps
+// would otherwise decay into numbers below the normal ones and stay there, and processors compute with those a
+// hundred times slower.
+constexpr float kLeastFirst = 1e-30f, kLeastSecond = 1e-36f;
+
 }  // namespace
 
 AdamStep::AdamStep(double rate, int64_t step, double beta2)
@@ -27,8 +33,8 @@ void AdamUpdate(const AdamStep& step, size_t count, float* __restrict parameter,
     const float g = gradient[i];
     const float m = b1 * first[i] + (1 - b1) * g;
     const float v = b2 * second[i] + (1 - b2) * g * g;
-    first[i] = m;
-    second[i] = v;
+    first[i] = std::abs(m) < kLeastFirst ? 0.0f : m;
+    second[i] = v < kLeastSecond ? 0.0f : v;
     parameter[i] -= rate * m / (std::sqrt(v * step.second_correction) + kEpsilon);
     gradient[i] = 0;
   }
