@@ -56,6 +56,7 @@ TEST(TrainCost, GoesOnFromWhatIsMeasuredAndForgetsAnotherSubject) {
   TrainCostOptions options;
   options.own = ReadTrainOptions("fast", {"schedule.iterations=4", "sampling.rays=32", "extract.cell_mm=4"});
   options.few = true;
+  options.knobs = {"grid_levels", "frames"};
   options.seeds = 1;
   options.folder = folder / "cost";
   options.subject = "one";
@@ -70,6 +71,11 @@ TEST(TrainCost, GoesOnFromWhatIsMeasuredAndForgetsAnotherSubject) {
     }
   }
   EXPECT_FALSE(std::filesystem::exists(options.folder / "run"));
+
+  options.knobs = {"colour"};
+  const std::string no_such = test::ErrorOf([&] { MeasureTrainCost(SmallSequence(), options); });
+  EXPECT_NE(no_such.find("grid_levels"), std::string::npos) << no_such;
+  options.knobs = {"grid_levels", "frames"};
 
   // A mark in the record shows what is taken from it.
   auto json = nlohmann::json::parse(ReadFile(options.folder / "measured.json"));

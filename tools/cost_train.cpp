@@ -22,6 +22,7 @@ struct Arguments {
   std::vector<std::string> settings;
   double scale = 0;  // 0 = not said
   TrainArguments train;
+  std::vector<std::string> knobs;
   int seeds = 0;  // 0 = not said
   bool quick = false;
 };
@@ -121,6 +122,7 @@ nlohmann::json Run(const Arguments& arguments, const CommonOptions& common) {
   TrainCostOptions options;
   options.own = OwnOptions(arguments);
   options.few = arguments.quick;
+  options.knobs = arguments.knobs;
   options.seeds = arguments.seeds > 0 ? arguments.seeds : arguments.quick ? 1 : kSeeds;
   options.seed = common.seed;
   options.folder = arguments.folder;
@@ -156,6 +158,8 @@ void AddCostTrain(CLI::App* cost) {
   command->add_option("--set", arguments->settings, "a key of the scene: path.to.key=value");
   command->add_option("--scale", arguments->scale, "of the picture's width and height (default: 1)")
       ->check(CLI::Range(1e-3, 8.0));
+  command->add_option("--knob", arguments->knobs,
+                      "a knob to measure, by its name in the table (default: all)");
   command->add_option("--seeds", arguments->seeds, "runs of every setting (default: 3)")
       ->check(CLI::Range(1, 1000));
   command->add_flag("--quick", arguments->quick,

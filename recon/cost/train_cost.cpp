@@ -1,5 +1,6 @@
 #include "recon/cost/train_cost.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
@@ -63,13 +64,30 @@ class Record {
   nlohmann::json runs_ = nlohmann::json::object();
 };
 
+std::vector<TrainKnob> KnobsToMeasure(const TrainCostOptions& options, const Sequence& sequence) {
+  const std::vector<TrainKnob> all =
+      TrainKnobsOf(options.own, static_cast<int>(sequence.frames.size()), options.few);
+  if (options.knobs.empty()) return all;
+  std::vector<TrainKnob> named;
+  for (const std::string& name : options.knobs) {
+    const auto knob = std::ranges::find(all, name, &TrainKnob::name);
+    if (knob == all.end()) {
+      std::string known;
+      for (const TrainKnob& other : all) known += (known.empty() ? "" : ", ") + other.name;
+      throw InputError("--knob " + name + ": this training has no such knob; there are: " + known);
+    }
+    named.push_back(*knob);
+  }
+  return named;
+}
+
 class TrainCostMeasurement {
  public:
   TrainCostMeasurement(const Sequence& sequence, const TrainCostOptions& options)
       : sequence_(sequence),
         options_(options),
         truth_(ReadGroundTruth(sequence)),
-        knobs_(TrainKnobsOf(options.own, static_cast<int>(sequence.frames.size()), options.few)),
+        knobs_(KnobsToMeasure(options, sequence)),
         record_((CreateFolder(options.folder), options.folder / "measured.json"), options.subject) {
     for (const TrainKnob& knob : knobs_) runs_ += static_cast<int>(knob.settings.size()) * options.seeds;
   }

@@ -4,6 +4,8 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
+#include <vector>
 
 #include "common/cost_curves.h"
 #include "common/sequence.h"
@@ -12,9 +14,10 @@
 namespace lumen {
 
 struct TrainCostOptions {
-  TrainOptions own;  // what the settings are variations of
-  bool few = false;  // settings
-  int seeds = 3;     // runs a setting: the median counts, half the range is the spread
+  TrainOptions own;                // what the settings are variations of
+  bool few = false;                // settings
+  std::vector<std::string> knobs;  // names; none = all
+  int seeds = 3;                   // runs a setting: the median counts, half the range is the spread
   uint64_t seed = 0;
   // Where runs are made and what has been measured stands (measured.json): a run that is in there isn't made
   // again, so that a measurement that was stopped goes on.
@@ -25,7 +28,7 @@ struct TrainCostOptions {
 
 // Measures, in this order: mean absolute error of the surveyed and of the extended region, mm; NaN where the
 // run leaves no surface. Seconds are the wall time of training. Throws InputError where the sequence has no
-// ground truth.
+// ground truth, and for a knob that there isn't.
 CostCurves MeasureTrainCost(const Sequence& sequence, const TrainCostOptions& options);
 
 }  // namespace lumen
