@@ -90,7 +90,10 @@ class SamplerLanes {
   // pixels: the second argument of each lane's Sampler.
   SamplerLanes(uint64_t seed, const uint64_t pixels[kLanes], Sampling sampling = Sampling::kSobol)
       : sampling_(sampling) {
-    for (int i = 0; i < kLanes; ++i) (i < kLanes / 2 ? low_ : high_)[i % (kLanes / 2)] = pixels[i];
+    for (int i = 0; i < kLanes / 2; ++i) {
+      low_[i] = pixels[i];
+      high_[i] = pixels[kLanes / 2 + i];
+    }
     low_ = MixEach64(low_ ^ Mix64(seed));
     high_ = MixEach64(high_ ^ Mix64(seed));
   }
