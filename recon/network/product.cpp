@@ -75,6 +75,42 @@ void AccumulateBlock(const Panel<T>& y, int first_output, const Panel<T>& x, int
   }
 }
 
+// From so many columns on the product goes by broadcasts, which need no sums across a register; below, what
+// transposing costs and what is lost at the last block's end count for more.
+constexpr int kWide = 64;
+
+// Columns [first, first + kTile) of a tile's transpose: to[s · kTile + i] = x[first + i][s], 0 beyond the
+// last.
+template <class T>
+void TransposeBlock(const Panel<T>& x, int tile, int first, T* to) {
+  const int columns = std::min(kTile, x.rows() - first);
+  for (int i = 0; i < columns; ++i) {
+    const T* row = x.Row(tile, first + i);
+    for (int s = 0; s < kTile; ++s) to[s * kTile + i] = row[s];
+  }
+  for (int i = columns; i < kTile; ++i)
+    for (int s = 0; s < kTile; ++s) to[s * kTile + i] = 0;
+}
+
+// The same as AccumulateGroup for one tile.
+template <class T>
+void AccumulateWideTile(const Panel<T>& y, const Panel<T>& x, int tile, T* gradient) {
+  alignas(64) T block[kTile * kTile];
+  alignas(64) T sum[4 * kTile];
+  for (int first = 0; first < x.rows(); first += kTile) {
+    TransposeBlock(x, tile, first, block);
+    const int columns = std::min(kTile, x.rows() - first);
+    for (int o = 0; o < y.rows(); o += 4) {
+      const int rows = std::min(4, y.rows() - o);
+      MultiplyStrided<T>(y.Row(tile, o), kTile, 1, nullptr, rows, kTile, block, sum);
+      for (int r = 0; r < rows; ++r) {
+        T* to = gradient + size_t(o + r) * x.rows() + first;
+        for (int i = 0; i < columns; ++i) to[i] += sum[r * kTile + i];
+      }
+    }
+  }
+}
+
 template <class T>
 void AccumulateGroup(const Panel<T>& y, const Panel<T>& x, TileRange tiles, T* gradient) {
   const int outputs = y.rows();
@@ -108,11 +144,13 @@ void MultiplyTransposed(const T* weight, int outputs, int inputs, const T* y, T*
 template <class T>
 void AccumulateOuter(const Panel<T>& y, const Panel<T>& x, T* gradient, T* bias_gradient) {
   const int outputs = y.rows();
-  const int inputs = x.rows();
-  const size_t tile_bytes = size_t(outputs + inputs) * kTile * sizeof(T);
-  const int group = static_cast<int>(std::max<size_t>(1, kGroupBytes / tile_bytes));
-  for (int begin = 0; begin < y.tiles(); begin += group) {
-    AccumulateGroup(y, x, {begin, std::min(begin + group, y.tiles())}, gradient);
+  if (x.rows() >= kWide) {
+    for (int tile = 0; tile < y.tiles(); ++tile) AccumulateWideTile(y, x, tile, gradient);
+  } else {
+    const size_t tile_bytes = size_t(outputs + x.rows()) * kTile * sizeof(T);
+    const int group = static_cast<int>(std::max<size_t>(1, kGroupBytes / tile_bytes));
+    for (int begin = 0; begin < y.tiles(); begin += group)
+      AccumulateGroup(y, x, {begin, std::min(begin + group, y.tiles())}, gradient);
   }
   if (!bias_gradient) return;
   for (int tile = 0; tile < y.tiles(); ++tile) {

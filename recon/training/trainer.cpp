@@ -14,7 +14,7 @@ constexpr int kChunkRays = 32;  // also what the pulls on albedo and ambient fac
 
 // Rays that are computed at once where chunks share workspaces: enough to keep the products busy, few enough
 // for the memory that a wide network's passes take.
-constexpr int kPieceRays = 8;
+constexpr int kPieceRays = 4;
 
 double LogInterpolate(double from, double to, double at) { return from * std::pow(to / from, at); }
 
