@@ -255,6 +255,10 @@ TEST_P(RayLossGradient, MatchesFiniteDifferences) {
   light.sources.push_back({Vec3d(-1, 0.2, 0), Vec3d::UnitZ(), 1.0, Vec3d(100, 200, 150)});
   std::vector<FrameLight<double>> lights = {LightOfFrame<double>(light, pose, Vec3d::Zero())};
   lights[0].mean_radiance = Vec3d(0.3, 0.2, 0.1);
+  if (options.interreflection == Interreflection::kRadiosity) {
+    auto& map = lights[0].surroundings.emplace();
+    for (Vec3d& value : map.values) value = Vec3d(1 + Random(state), 1 + Random(state), 1);
+  }
   std::vector<double> log_gain = {0.1};
 
   RayBatch<double> batch;
@@ -337,6 +341,7 @@ TEST_P(RayLossGradient, MatchesFiniteDifferences) {
 INSTANTIATE_TEST_SUITE_P(Looks, RayLossGradient,
                          testing::Values(LookOfWall{Reflectance::kLambertian, Interreflection::kNone},
                                          LookOfWall{Reflectance::kLambertian, Interreflection::kMean},
+                                         LookOfWall{Reflectance::kLambertian, Interreflection::kRadiosity},
                                          LookOfWall{Reflectance::kFree, Interreflection::kNone},
                                          LookOfWall{Reflectance::kUnlit, Interreflection::kNone},
                                          LookOfWall{Reflectance::kFree, Interreflection::kNone, true},

@@ -61,7 +61,8 @@ void Field<T>::Initialise(uint64_t seed, T* parameters) const {
   if (!has_ambient()) return;
   T* ambient = parameters + grid_size() + sdf_.parameter_count() + color_.parameter_count();
   ambient_.Initialise(seed * 3 + 3, kColorStart, ambient);
-  ambient[ambient_.parameter_count() - 1] = static_cast<T>(kAmbientStart);
+  if (options_.interreflection == Interreflection::kMean)
+    ambient[ambient_.parameter_count() - 1] = static_cast<T>(kAmbientStart);
 }
 
 template <class T>

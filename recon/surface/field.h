@@ -26,8 +26,9 @@ enum class Reflectance {
 
 // What the wall receives from the rest of the wall.
 enum class Interreflection {
-  kNone,  // nothing: the paper's model
-  kMean,  // π · the frame's mean radiance · exp(a smooth function of place that is learnt)
+  kNone,       // nothing: the paper's model
+  kMean,       // π · the frame's mean radiance · exp(a smooth function of place that is learnt)
+  kRadiosity,  // what the surface sends itself around the camera, by radiosity, · exp(the same)
 };
 
 struct FieldOptions {
@@ -99,8 +100,8 @@ class Field {
     Panel<T> ambient_input;
     typename Mlp<T>::Pass sdf, color, ambient;
     const Panel<T>& color_output() const { return color.value.back(); }
-    // Log of the irradiance from the rest of the wall over π · the frame's mean radiance; if the field
-    // has_ambient.
+    // Log of the irradiance from the rest of the wall over that which its model gives before what is learnt
+    // (see Interreflection); if the field has_ambient.
     const Panel<T>& ambient_output() const { return ambient.value.back(); }
   };
   void Surface(const T* parameters, SurfacePass* pass) const;

@@ -7,6 +7,8 @@ namespace lumen {
 template <class T>
 FrameLight<T> LightOfFrame(const Light& light, const Pose& world_from_camera, const Vec3d& origin) {
   FrameLight<T> result;
+  result.camera = (world_from_camera.translation() - origin).cast<T>();
+  result.camera_from_field = world_from_camera.linear().transpose().cast<T>();
   for (const LightSource& source : light.sources) {
     result.sources.push_back({(world_from_camera * source.position - origin).cast<T>(),
                               (world_from_camera.linear() * source.direction).cast<T>(),

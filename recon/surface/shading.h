@@ -3,10 +3,12 @@
 // sources off the axis are not modelled.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "common/light.h"
 #include "common/math.h"
+#include "recon/surface/direction_map.h"
 #include "recon/surface/field.h"
 
 namespace lumen {
@@ -20,7 +22,11 @@ struct FrameLight {
     Vec3<T> intensity;
   };
   std::vector<Source> sources;
+  Vec3<T> camera;                           // its place, in the field's axes
+  Mat3<T> camera_from_field;                // rotation
   Vec3<T> mean_radiance = Vec3<T>::Zero();  // over the frame's pixels, at gain 1
+  // Irradiance from the rest of the wall by direction in camera axes, at gain 1; where it is modelled so.
+  std::optional<DirectionMap<T>> surroundings;
 };
 template <class T>
 FrameLight<T> LightOfFrame(const Light& light, const Pose& world_from_camera, const Vec3d& origin);

@@ -8,7 +8,7 @@
 namespace lumen {
 namespace {
 
-constexpr char kMagic[8] = {'l', 'u', 'm', 'e', 'n', 'c', 'k', '3'};
+constexpr char kMagic[8] = {'l', 'u', 'm', 'e', 'n', 'c', 'k', '4'};
 
 // FNV-1a, 64 bits (Fowler, Noll, Vo).
 uint64_t Checksum(std::string_view bytes) {
@@ -85,6 +85,7 @@ void Arrays(Archive&& array, State& state) {
   array(state.log_gain);
   array(state.log_gain_first);
   array(state.log_gain_second);
+  array(state.surroundings);
 }
 
 }  // namespace

@@ -83,7 +83,7 @@ const std::vector<std::string> kShapeNames = {"tube", "sphere"};
 const std::vector<std::string> kSamplerNames = {"guided", "importance"};
 const std::vector<std::string> kDecayNames = {"exponential", "cosine"};
 const char* const kReflectanceNames[] = {"lambertian", "free", "unlit"};
-const char* const kInterreflectionNames[] = {"none", "mean"};
+const char* const kInterreflectionNames[] = {"none", "mean", "radiosity"};
 
 std::vector<int> Widths(const ConfigTable& table, const std::string& key, const std::vector<int>& otherwise) {
   if (!table.Has(key)) return otherwise;
@@ -121,8 +121,9 @@ void ReadField(const ConfigTable& root, FieldOptions* field) {
       if (name == kReflectanceNames[i]) field->reflectance = static_cast<Reflectance>(i);
     const std::string source =
         network->Choice("interreflection", kInterreflectionNames[int(field->interreflection)],
-                        {kInterreflectionNames, kInterreflectionNames + 2});
-    field->interreflection = source == "mean" ? Interreflection::kMean : Interreflection::kNone;
+                        {kInterreflectionNames, kInterreflectionNames + 3});
+    for (int i = 0; i < 3; ++i)
+      if (source == kInterreflectionNames[i]) field->interreflection = static_cast<Interreflection>(i);
     field->ambient_hidden = Widths(*network, "ambient_hidden", field->ambient_hidden);
   }
   if (const auto initial = root.Optional("initial")) {

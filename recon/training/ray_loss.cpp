@@ -95,7 +95,11 @@ void RayLoss<T>::ShadeActive(const T* parameters, const RayBatch<T>& batch,
     const Vec3<T> normal(surface_.normal.At(0, i), surface_.normal.At(1, i), surface_.normal.At(2, i));
     const int frame = batch.rays[sample.ray].frame;
     Vec3<T> ambient = Vec3<T>::Zero();
-    if (field_->has_ambient()) {
+    if (lights[frame].surroundings) {
+      const auto& light = lights[frame];
+      ambient = std::exp(surface_.ambient_output().At(0, i)) *
+                light.surroundings->At(light.camera_from_field * batch.rays[sample.ray].direction);
+    } else if (field_->has_ambient()) {
       // What the pixels show of the other places holds the frame's gain already.
       const T factor = T(kPi) * std::exp(surface_.ambient_output().At(0, i) - log_gain[frame]);
       ambient = factor * lights[frame].mean_radiance;
@@ -110,13 +114,15 @@ template <class T>
 double RayLoss<T>::ComparePixels(const RayBatch<T>& batch, const std::vector<T>& log_gain,
                                  const LossSettings<T>& settings, T* log_gain_gradient) {
   const bool lit = field_->options().reflectance != Reflectance::kUnlit;
+  // Radiosity is of the light guides' light; the mean radiance is what the pixels show.
+  const bool follows_gain = field_->options().interreflection == Interreflection::kRadiosity;
   radiance_delta_.assign(batch.rays.size(), Vec3<T>::Zero());
   ambient_.assign(batch.rays.size(), Vec3<T>::Zero());
   for (size_t i = 0; i < active_.size(); ++i) {
     const Active& sample = active_[i];
     if (!(sample.weight > 0)) continue;
     radiance_delta_[sample.ray] += sample.weight * shading_[i].radiance;
-    ambient_[sample.ray] += sample.weight * shading_[i].ambient;
+    if (!follows_gain) ambient_[sample.ray] += sample.weight * shading_[i].ambient;
   }
   double loss = 0;
   const T share = settings.per_ray / 3;

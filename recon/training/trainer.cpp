@@ -6,6 +6,7 @@
 #include "common/parallel.h"
 #include "common/random.h"
 #include "recon/training/march.h"
+#include "recon/training/surroundings.h"
 
 namespace lumen {
 namespace {
@@ -15,6 +16,8 @@ constexpr int kChunkRays = 32;  // also what the pulls on albedo and ambient fac
 // Rays that are computed at once where chunks share workspaces: enough to keep the products busy, few enough
 // for the memory that a wide network's passes take.
 constexpr int kPieceRays = 4;
+
+constexpr int64_t kSurroundingsEvery = 250;  // iterations
 
 double LogInterpolate(double from, double to, double at) { return from * std::pow(to / from, at); }
 
@@ -45,7 +48,7 @@ Trainer::Trainer(const TrainingFrames& frames, const TrainOptions& options, uint
   field_ = std::make_unique<Field<float>>(options.field, initial, Eigen::AlignedBox3d(-half, half));
   for (const Pose& pose : frames.world_from_camera()) {
     lights_.push_back(LightOfFrame<float>(frames.light(), pose, origin_));
-    if (!field_->has_ambient()) continue;
+    if (!field_->has_ambient() || has_surroundings()) continue;
     lights_.back().mean_radiance = frames.MeanRadiance(static_cast<int>(lights_.size()) - 1).cast<float>();
   }
   for (int begin = 0; begin < options.sampling.rays; begin += kChunkRays) {
@@ -64,6 +67,9 @@ Trainer::Trainer(const TrainingFrames& frames, const TrainOptions& options, uint
   state_.log_gain.assign(frames.size(), 0.0f);
   state_.log_gain_first = state_.log_gain_second = state_.log_gain;
   state_.log_sharpness[0] = static_cast<float>(std::log(options.schedule.sharpness_start_per_mm));
+  if (has_surroundings()) {
+    state_.surroundings.assign(static_cast<size_t>(frames.size()) * DirectionMap<float>::kCells * 3, 0.0f);
+  }
   field_->Initialise(seed, state_.parameters.data());
   norm_.Initialise(state_.parameters.data());
   if (options.field.reflectance != Reflectance::kUnlit) MatchColorsToInitialSurface(initial);
@@ -235,7 +241,30 @@ void Trainer::UpdateSharpness(double rate, double gradient) {
              &slope, &first, &second);
 }
 
+bool Trainer::has_surroundings() const {
+  return field_->has_ambient() && options_.field.interreflection == Interreflection::kRadiosity;
+}
+
+// The state's maps are what a run that is taken up again goes on with.
+void Trainer::UpdateSurroundings() {
+  const float* weights = Weights();
+  const bool due = state_.iteration % kSurroundingsEvery == 0;
+  if (!due && lights_.front().surroundings) return;
+  ParallelFor(0, static_cast<int64_t>(lights_.size()), [&](int64_t i) {
+    float* stored = &state_.surroundings[static_cast<size_t>(i) * DirectionMap<float>::kCells * 3];
+    auto& map = lights_[i].surroundings;
+    if (due) map = SurroundingsOf(*field_, weights, options_.sampling, lights_[i]);
+    if (!due) map.emplace();
+    for (Vec3f& value : map->values) {
+      if (due) std::copy_n(value.data(), 3, stored);
+      value = Vec3f(stored[0], stored[1], stored[2]);
+      stored += 3;
+    }
+  });
+}
+
 StepReport Trainer::Step(double progress) {
+  if (has_surroundings()) UpdateSurroundings();
   const LossSettings<float> settings = SettingsAt(progress);
   const float* weights = Weights();
   StepReport report;

@@ -26,7 +26,9 @@ struct TrainState {
   LineVector<float> parameters, first, second;
   std::array<float, 3> log_sharpness = {};  // of s in 1/mm, and its moments; where it is learnt
   std::vector<float> log_gain, log_gain_first, log_gain_second;  // a frame; 0 where the gain is known
-  int64_t skipped_steps = 0;                                     // whose loss or gradient was not finite
+  // Where interreflection is by radiosity: a frame's DirectionMap after the other, as last computed.
+  std::vector<float> surroundings;
+  int64_t skipped_steps = 0;  // whose loss or gradient was not finite
   int64_t first_skipped_step = -1;
 };
 
@@ -79,6 +81,8 @@ class Trainer {
   double RateAt(double progress) const;
   LossSettings<float> SettingsAt(double progress) const;
   bool GradientsAreFinite() const;
+  bool has_surroundings() const;
+  void UpdateSurroundings();
   void UpdateNetworks(const AdamStep& step);
   void UpdateGains(const AdamStep& step);
   void UpdateSharpness(double rate, double gradient);

@@ -1,0 +1,65 @@
+#include "recon/training/surroundings.h"
+
+#include <algorithm>
+
+#include "recon/surface/radiosity.h"
+#include "recon/training/march.h"
+
+namespace lumen {
+namespace {
+
+// At grazing incidence the patch of a direction is long; beyond a quarter of its length across its width, a
+// single place says little about it, and longer ones would outweigh all others.
+constexpr double kShallowestCosine = 0.25;
+
+constexpr float kSharp = 1e3f;  // 1/mm: all surface samples lie within a hundredth of a mm of the surface
+
+}  // namespace
+
+DirectionMap<float> SurroundingsOf(const Field<float>& field, const float* parameters,
+                                   const TrainOptions::Sampling& sampling, const FrameLight<float>& light) {
+  constexpr int kCells = DirectionMap<float>::kCells;
+  RayBatch<float> batch;
+  batch.rays.resize(kCells);
+  for (int cell = 0; cell < kCells; ++cell) {
+    batch.rays[cell].origin = light.camera;
+    batch.rays[cell].direction = light.camera_from_field.transpose() * DirectionMap<float>::Direction(cell);
+  }
+  Marcher(&field).Place(parameters, sampling, kSharp, 0, &batch);
+  Field<float>::SurfacePass pass;
+  pass.positions.Resize(3, TilesFor(kCells));
+  pass.normal.Resize(3, TilesFor(kCells));
+  std::vector<float> distance(kCells);
+  for (int i = 0; i < kCells; ++i) {
+    distance[i] = batch.distance[size_t(i + 1) * batch.samples - 1];
+    for (int d = 0; d < 3; ++d)
+      pass.positions.At(d, i) = batch.rays[i].origin[d] + distance[i] * batch.rays[i].direction[d];
+  }
+  field.Surface(parameters, &pass);
+  field.Color(parameters, &pass);
+  const auto vector = [](const Panel<float>& panel, int i) {
+    return Vec3f(panel.At(0, i), panel.At(1, i), panel.At(2, i));
+  };
+  std::vector<Patch> patches(kCells);
+  for (int i = 0; i < kCells; ++i) {
+    const Vec3f gradient = vector(pass.gradient, i), point = vector(pass.positions, i);
+    const float length = gradient.norm();
+    const Vec3f normal = length > 0 ? Vec3f(gradient / length) : Vec3f(-batch.rays[i].direction);
+    Patch& patch = patches[i];
+    patch.point = point.cast<double>();
+    patch.normal = normal.cast<double>();
+    const double cosine = std::max<double>(kShallowestCosine, -normal.dot(batch.rays[i].direction));
+    patch.area_mm2 =
+        double(DirectionMap<float>::SolidAngle(i)) * double(distance[i]) * double(distance[i]) / cosine;
+    patch.albedo = vector(pass.color_output(), i).array().exp().matrix().cast<double>();
+    patch.irradiance =
+        kPi * Shade<float>(Reflectance::kLambertian, Vec3f::Zero(), normal, light, point, Vec3f::Zero())
+                  .radiance.cast<double>();
+  }
+  const std::vector<Vec3d> irradiance = InterreflectedIrradiance(patches);
+  DirectionMap<float> map;
+  for (int i = 0; i < kCells; ++i) map.values[i] = irradiance[i].cast<float>();
+  return map;
+}
+
+}  // namespace lumen
