@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "common/parallel.h"
 #include "recon/evaluation/mesh_check.h"
 #include "recon/network/product.h"
 #include "recon/network/weight_norm.h"
@@ -190,12 +191,34 @@ TEST(Importance, SamplesGatherWhereTheSurfaceIs) {
   }
 }
 
-TEST(Paper, ASmallOneLearnsAndEndsWithAClosedMesh) {
-  constexpr int kSteps = 200;
-  const TrainOptions options = ReadTrainOptions(
+TrainOptions SmallPaper() {
+  return ReadTrainOptions(
       "paper", {"network.sdf_hidden=[64, 64, 64, 64]", "network.sdf_skip=2", "network.color_hidden=[32, 32]",
                 "network.features=16", "sampling.rays=48", "sampling.uniform=24", "sampling.rounds=2",
                 "sampling.round=8", "schedule.learning_rate=2e-3"});
+}
+
+// Whatever the threads, and whether the steps are one trainer's or a state is handed on.
+TEST(Paper, AStepFollowsFromTheStateAlone) {
+  const TrainOptions options = SmallPaper();
+  const TrainingFrames frames(test::SmallSequence(), options.frames, true);
+  Trainer whole(frames, options, 5), first(frames, options, 5), second(frames, options, 5);
+  SetThreadCount(1);
+  for (int step = 0; step < 6; ++step) whole.Step(step / 10.0);
+  SetThreadCount(2);
+  for (int step = 0; step < 3; ++step) first.Step(step / 10.0);
+  second.state() = first.state();
+  for (int step = 3; step < 6; ++step) second.Step(step / 10.0);
+  SetThreadCount(0);
+  EXPECT_EQ(whole.state().parameters, second.state().parameters);
+  EXPECT_EQ(whole.state().log_sharpness, second.state().log_sharpness);
+  EXPECT_NE(whole.state().parameters, first.state().parameters);
+  EXPECT_NE(whole.state().log_sharpness, first.state().log_sharpness);
+}
+
+TEST(Paper, ASmallOneLearnsAndEndsWithAClosedMesh) {
+  constexpr int kSteps = 200;
+  const TrainOptions options = SmallPaper();
   const TrainingFrames frames(test::SmallSequence(), options.frames, true);
   Trainer trainer(frames, options, 0);
   double first = 0, last = 0, sharpness = 0;

@@ -99,6 +99,11 @@ TEST(TrainOptions, AreReadBackFromTheirText) {
   EXPECT_EQ(options.loss.eikonal, 0.25);
   EXPECT_EQ(options.field.sdf_hidden, (std::vector<int>{16, 8}));
   EXPECT_EQ(ReadTrainOptions("neus", {}).field.reflectance, Reflectance::kUnlit);
+  EXPECT_EQ(ReadTrainOptions("neus_paper", {}).field.reflectance, Reflectance::kUnlit);
+  EXPECT_EQ(ReadTrainOptions("neus_paper", {}).field.sdf_hidden.size(), 8u);
+  const std::string narrow =
+      test::ErrorOf([] { ReadTrainOptions("paper", {"network.sdf_hidden=[32, 32, 32, 32]"}); });
+  EXPECT_NE(narrow.find("sdf_skip"), std::string::npos) << narrow;
   // Mistakes are named with the remedy.
   const std::string misspelt = test::ErrorOf([] { ReadTrainOptions("fast", {"loss.eikonl=1"}); });
   EXPECT_NE(misspelt.find("eikonal"), std::string::npos) << misspelt;
@@ -142,6 +147,7 @@ TEST(Checkpoint, DamageIsRefused) {
   state.first = {4, 5, 6};
   state.second = {7, 8, 9};
   state.iteration = 17;
+  state.log_sharpness = {0.5f, -1, 2};
   WriteCheckpoint(folder / "checkpoint", "settings", state);
   TrainState back;
   back.parameters.resize(3);
@@ -150,6 +156,7 @@ TEST(Checkpoint, DamageIsRefused) {
   ReadCheckpoint(folder / "checkpoint", "settings", &back);
   EXPECT_EQ(back.iteration, 17);
   EXPECT_EQ(back.second[2], 9);
+  EXPECT_EQ(back.log_sharpness, state.log_sharpness);
   const std::string bytes = ReadFile(folder / "checkpoint");
   for (size_t at : {size_t(0), bytes.size() / 2, bytes.size() - 1}) {
     std::string changed = bytes;
