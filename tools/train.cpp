@@ -2,7 +2,6 @@
 
 #include <iostream>
 
-#include "common/error.h"
 #include "common/sequence.h"
 #include "recon/training/estimate.h"
 #include "tools/options.h"
@@ -59,7 +58,7 @@ void AddTrain(CLI::App* app) {
       AddSubcommand(app, "train", "reconstructs a sequence", [arguments](const CommonOptions& common) {
         const TrainOptions options = ReadTrainOptions(arguments->train.preset, arguments->train.Settings());
         if (arguments->dry_run) return Estimate(ReadSequence(arguments->sequence), options, common.seed);
-        if (arguments->run.empty()) throw InputError("-o: a run needs a folder; or say --dry-run");
+        if (arguments->run.empty()) throw CLI::RequiredError("-o (or --dry-run)");
         TrainRun run;
         run.folder = arguments->run;
         run.seed = common.seed;
