@@ -18,6 +18,12 @@ void ScaleRows(int rows, T scale, const T* from, T* to) {
   for (int i = 0; i < rows * kTile; ++i) to[i] = scale * from[i];
 }
 
+// Standard normal (Box and Muller), a function of (seed, at).
+double Gauss(uint64_t seed, uint64_t at) {
+  return std::sqrt(-2 * std::log(1 - UniformDouble(RandomBits(seed, at, 0)))) *
+         std::cos(2 * kPi * UniformDouble(RandomBits(seed, at, 1)));
+}
+
 template <class T>
 void AddScaledRows(int rows, T scale, const T* from, T* to) {
   for (int i = 0; i < rows * kTile; ++i) to[i] += scale * from[i];
@@ -52,28 +58,30 @@ void Mlp<T>::Initialise(uint64_t seed, double last_layer_scale, T* parameters) c
 }
 
 template <class T>
-void Mlp<T>::InitialiseAsSphere(uint64_t seed, double radius, int place_begin, T* parameters) const {
-  const int last = layer_count() - 1;
-  for (int l = 0; l <= last; ++l) {
+void Mlp<T>::InitialiseSmooth(uint64_t seed, double last_layer_scale, int place_begin, T* parameters) const {
+  for (int l = 0; l < layer_count(); ++l) {
     const Layer& layer = layers_[l];
     std::fill(parameters + layer.bias, parameters + layer.bias + layer.outputs, T(0));
+    const double scale = std::sqrt(2.0 / layer.outputs) * (l + 1 == layer_count() ? last_layer_scale : 1.0);
     for (int o = 0; o < layer.outputs; ++o) {
       for (int i = 0; i < layer.inputs; ++i) {
         const size_t at = layer.weight + size_t(o) * layer.inputs + i;
-        const double gauss = std::sqrt(-2 * std::log(1 - UniformDouble(RandomBits(seed, at, 0)))) *
-                             std::cos(2 * kPi * UniformDouble(RandomBits(seed, at, 1)));
         // Which of the network's inputs this is, if it is one.
         const int input = l == 0 ? i : JoinsInput(l) ? i - layers_[l - 1].outputs : -1;
-        const bool is_place = input >= place_begin && input < place_begin + 3;
-        double weight = gauss * std::sqrt(2.0 / layer.outputs);
-        if (l == 0 && !is_place) weight = 0;
-        if (l > 0 && input >= 0 && !is_place) weight = 0;
-        if (l == last) weight = -std::sqrt(kPi / layer.inputs) + 1e-4 * gauss;
-        parameters[at] = static_cast<T>(weight);
+        const bool counts = input < 0 || (input >= place_begin && input < place_begin + 3);
+        parameters[at] = static_cast<T>(counts ? scale * Gauss(seed, at) : 0.0);
       }
     }
   }
-  for (int o = 0; o < layers_[last].outputs; ++o) parameters[layers_[last].bias + o] = static_cast<T>(radius);
+}
+
+template <class T>
+void Mlp<T>::InitialiseAsSphere(uint64_t seed, double radius, int place_begin, T* parameters) const {
+  InitialiseSmooth(seed, 1, place_begin, parameters);
+  const Layer& last = layers_.back();
+  for (size_t at = last.weight; at < last.bias; ++at)
+    parameters[at] = static_cast<T>(-std::sqrt(kPi / last.inputs) + 1e-4 * Gauss(seed, at));
+  std::fill(parameters + last.bias, parameters + last.bias + last.outputs, static_cast<T>(radius));
 }
 
 template <class T>

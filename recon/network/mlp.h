@@ -37,8 +37,11 @@ class Mlp {
   size_t parameter_count() const { return parameter_count_; }
   // Weights uniform in ±√(6/inputs) (He 2015), biases 0; the last layer's times `last_layer_scale`.
   void Initialise(uint64_t seed, double last_layer_scale, T* parameters) const;
-  // NeuS's geometric start (Atzmon and Lipman 2020) turned inside out: the outputs are about radius − |x|,
-  // where x are the inputs from place_begin on, three of them; the others count for nothing yet.
+  // NeuS's geometric start (Atzmon and Lipman 2020) but for the last layer, which is normally distributed as
+  // the others are: of the inputs only the three from place_begin on count yet, so that the outputs are
+  // smooth functions of place.
+  void InitialiseSmooth(uint64_t seed, double last_layer_scale, int place_begin, T* parameters) const;
+  // And with it, turned inside out: the outputs are about radius − |place|.
   void InitialiseAsSphere(uint64_t seed, double radius, int place_begin, T* parameters) const;
   // Where the weights stand among the parameters.
   struct Matrix {

@@ -54,6 +54,8 @@ void Field<T>::Initialise(uint64_t seed, T* parameters) const {
   grid_.Initialise(seed * 3, parameters);
   if (initial_.is_learnt()) {
     sdf_.InitialiseAsSphere(seed * 3 + 1, initial_.radius_mm() / unit_, encoded(), parameters + grid_size());
+  } else if (options_.place_octaves > 0) {
+    sdf_.InitialiseSmooth(seed * 3 + 1, kSdfStart, encoded(), parameters + grid_size());
   } else {
     sdf_.Initialise(seed * 3 + 1, kSdfStart, parameters + grid_size());
   }

@@ -24,7 +24,8 @@ albedo = 0.0
 
 // NeuS's published configuration for scenes without masks (Wang et al. 2021), its unit being 68 mm. Warm-up:
 // 5,000 of 300,000 iterations. Sharpness: from 20 a unit on; its rounds from 64 a unit on. All samples are
-// shaded, as NeuS does.
+// shaded, as NeuS does. The tube is our start in place of NeuS's sphere, which initial.shape = "sphere" turns
+// inside out: one around all cameras is far from the walls of a lumen.
 constexpr const char* kPaper = R"(
 [grid]
 levels = 0
@@ -40,8 +41,6 @@ weight_norm = true
 unit_mm = 68.0
 reflectance = "free"
 interreflection = "none"
-[initial]
-shape = "sphere"
 [sampling]
 rays = 512
 sampler = "importance"
