@@ -64,7 +64,8 @@ TrainKnob SamplesKnob(const TrainOptions& own, const std::vector<double>& factor
 TrainKnob InterreflectionKnob(const TrainOptions& own) {
   TrainKnob knob{"interreflection", {}};
   const std::pair<Interreflection, const char*> kinds[] = {{Interreflection::kNone, "none"},
-                                                           {Interreflection::kMean, "mean"}};
+                                                           {Interreflection::kMean, "mean"},
+                                                           {Interreflection::kRadiosity, "radiosity"}};
   for (const auto& [kind, label] : kinds) {
     TrainKnobSetting setting{label, own, own.field.interreflection == kind};
     setting.options.field.interreflection = kind;
