@@ -70,7 +70,7 @@ Sequence Subject(const Arguments& arguments, const std::string& subject, double 
 std::string NumberOrDash(double value) { return std::isfinite(value) ? fmt::format("{:.3f}", value) : "-"; }
 
 std::string Table(const CostCurves& curves) {
-  std::string table = fmt::format("{:<18}{:>12}{:>20}{:>16}{:>16}\n", "knob", "setting", "seconds",
+  std::string table = fmt::format("{:<18}{:>12}{:>20}{:>16}{:>16}\n", "knob", "setting", "CPU s",
                                   "surveyed mm", "extended mm");
   for (const CostCurve& curve : curves.curves) {
     for (const CostPoint& point : curve.points) {
@@ -88,8 +88,7 @@ Drawing Page(const CostCurves& curves) {
   Drawing page{2 * kWidth, kHeight, {}};
   const char* const titles[] = {"Surveyed region", "Extended region"};
   for (size_t measure = 0; measure < 2; ++measure) {
-    Plot plot = CostPlot(curves, measure, fmt::format("seconds of training, {} threads", ThreadCount()),
-                         "mean absolute error, mm");
+    Plot plot = CostPlot(curves, measure, "CPU seconds of training", "mean absolute error, mm");
     plot.title = titles[measure];
     Place(DrawPlot(plot, kWidth, kHeight), static_cast<double>(measure) * kWidth, 0, &page);
   }
@@ -105,8 +104,8 @@ nlohmann::json ToJson(const CostCurves& curves) {
     for (const CostPoint& point : curve.points) {
       points.push_back({{"knob", curve.knob},
                         {"setting", point.setting},
-                        {"seconds", point.seconds},
-                        {"seconds_spread", point.seconds_spread},
+                        {"cpu_seconds", point.seconds},
+                        {"cpu_seconds_spread", point.seconds_spread},
                         {"surveyed_mae_mm", number(point.errors[0])},
                         {"surveyed_spread_mm", number(point.error_spreads[0])},
                         {"extended_mae_mm", number(point.errors[1])},

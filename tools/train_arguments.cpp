@@ -29,6 +29,7 @@ void AddTrainArguments(CLI::App* command, TrainArguments* arguments, const std::
 
 nlohmann::json ToJson(const TrainResult& result) {
   return {{"seconds", result.seconds},
+          {"cpu_seconds", result.cpu_seconds},
           {"iterations", result.iterations},
           {"rays_per_second", result.rays_per_second},
           {"final_loss", result.final_loss},

@@ -138,7 +138,7 @@ class TrainCostMeasurement {
     run.folder = options_.folder / "run";
     run.seed = seed;
     try {
-      measured.seconds = Train(sequence_, options, run).seconds;
+      measured.seconds = Train(sequence_, options, run).cpu_seconds;
       EvaluateOptions evaluate;
       evaluate.completeness_points = kCompletenessPoints;
       const Evaluation evaluation = Evaluate(ReadMesh(run.folder / "mesh.ply"), truth_, sequence_, evaluate);

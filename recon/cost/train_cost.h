@@ -27,8 +27,9 @@ struct TrainCostOptions {
 };
 
 // Measures, in this order: mean absolute error of the surveyed and of the extended region, mm; NaN where the
-// run leaves no surface. Seconds are the wall time of training. Throws InputError where the sequence has no
-// ground truth, and for a knob that there isn't.
+// run leaves no surface. Seconds are CPU seconds of training, of all threads, so that what else the machine
+// does counts little. Throws InputError where the sequence has no ground truth, and for a knob that there
+// isn't.
 CostCurves MeasureTrainCost(const Sequence& sequence, const TrainCostOptions& options);
 
 }  // namespace lumen

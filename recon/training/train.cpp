@@ -2,6 +2,7 @@
 
 #include <chrono>
 #include <cmath>
+#include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "common/error.h"
@@ -75,6 +76,7 @@ class Run {
     Progress progress("train");
     TrainState& state = trainer_.state();
     const auto start = Clock::now();
+    const std::clock_t cpu_start = std::clock();
     const double seconds_before = state.seconds;
     const int64_t iterations_before = state.iteration;
     double last_report = 0, last_checkpoint = 0;
@@ -103,6 +105,7 @@ class Run {
       }
     }
     result_.seconds = seconds_before + SecondsSince(start);
+    result_.cpu_seconds = static_cast<double>(std::clock() - cpu_start) / CLOCKS_PER_SEC;
     result_.iterations = state.iteration;
     result_.rays_per_second = static_cast<double>(state.iteration - iterations_before) *
                               options_.sampling.rays / std::max(SecondsSince(start), 1e-9);

@@ -17,7 +17,8 @@ struct TrainRun {
 };
 
 struct TrainResult {
-  double seconds = 0;  // of training; reading frames and extracting the mesh come on top
+  double seconds = 0;      // of training; reading frames and extracting the mesh come on top
+  double cpu_seconds = 0;  // of it, of all threads; since the run was resumed
   int64_t iterations = 0;
   double rays_per_second = 0;
   double final_loss = 0;
