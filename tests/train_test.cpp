@@ -54,6 +54,7 @@ pid_t StartTraining(const std::filesystem::path& folder, bool resume) {
                                           "--iterations",   "120",
                                           "--set",          "sampling.rays=96",
                                           "--set",          "extract.cell_mm=3",
+                                          "--set",          "grid.log2_table_size=10",
                                           "--set",          "schedule.checkpoint_seconds=0"};
     if (resume) arguments.push_back("--resume");
     arguments.push_back(nullptr);

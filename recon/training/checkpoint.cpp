@@ -2,13 +2,13 @@
 
 #include <cstring>
 
-#include "common/error.h"
 #include "common/files.h"
+#include "common/progress.h"
 
 namespace lumen {
 namespace {
 
-constexpr char kMagic[8] = {'l', 'u', 'm', 'e', 'n', 'c', 'k', '4'};
+constexpr char kMagic[8] = {'l', 'u', 'm', 'e', 'n', 'c', 'k', '5'};
 
 // FNV-1a, 64 bits (Fowler, Noll, Vo).
 uint64_t Checksum(std::string_view bytes) {
@@ -50,17 +50,16 @@ class Reader {
   std::string Text() {
     uint64_t size;
     Value(&size);
-    if (size > bytes_.size())
-      throw InputError(name_ + ": the checkpoint is cut short; remove it to start afresh");
+    if (size > bytes_.size()) FailShort();
     std::string text(size, '\0');
     Copy(text.data(), size);
     return text;
   }
 
  private:
+  [[noreturn]] void FailShort() const { throw DamagedCheckpoint(name_ + ": the checkpoint is cut short"); }
   void Copy(void* to, size_t size) {
-    if (size > bytes_.size())
-      throw InputError(name_ + ": the checkpoint is cut short; remove it to start afresh");
+    if (size > bytes_.size()) FailShort();
     std::memcpy(to, bytes_.data(), size);
     bytes_.remove_prefix(size);
   }
@@ -73,6 +72,7 @@ template <class Archive, class State>
 void Fields(Archive&& value, State& state) {
   value(state.iteration);
   value(state.seconds);
+  value(state.start_photometric);
   value(state.skipped_steps);
   value(state.first_skipped_step);
   value(state.log_sharpness);
@@ -98,7 +98,16 @@ void WriteCheckpoint(const std::filesystem::path& file, const std::string& setti
   Fields([&](const auto& value) { writer.Value(value); }, state);
   Arrays([&](const auto& values) { writer.Array(values); }, state);
   writer.Value(Checksum(writer.bytes));
-  WriteFile(file, writer.bytes);
+  PendingFile pending(file);
+  WriteFile(pending.path(), writer.bytes);
+  // Killed between these two, a run leaves the one before alone, which is whole.
+  std::error_code there_is_none;
+  std::filesystem::rename(file, CheckpointBefore(file), there_is_none);
+  pending.Commit();
+}
+
+std::filesystem::path CheckpointBefore(const std::filesystem::path& file) {
+  return file.string() + ".before";
 }
 
 void ReadCheckpoint(const std::filesystem::path& file, const std::string& settings, TrainState* state) {
@@ -106,13 +115,13 @@ void ReadCheckpoint(const std::filesystem::path& file, const std::string& settin
   const std::string name = file.string();
   if (bytes.size() < sizeof(kMagic) + sizeof(uint64_t) ||
       std::memcmp(bytes.data(), kMagic, sizeof(kMagic)) != 0) {
-    throw InputError(name + ": not a checkpoint of this version, or cut short; remove it to start afresh");
+    throw DamagedCheckpoint(name + ": not a checkpoint of this version, or cut short");
   }
   const std::string_view content(bytes.data(), bytes.size() - sizeof(uint64_t));
   uint64_t checksum;
   std::memcpy(&checksum, bytes.data() + content.size(), sizeof(checksum));
   if (checksum != Checksum(content)) {
-    throw InputError(name + ": the checkpoint is damaged (its checksum is wrong); remove it to start afresh");
+    throw DamagedCheckpoint(name + ": the checkpoint is damaged (its checksum is wrong)");
   }
   Reader reader(content.substr(sizeof(kMagic)), name);
   if (reader.Text() != settings) {
@@ -122,6 +131,40 @@ void ReadCheckpoint(const std::filesystem::path& file, const std::string& settin
   }
   Fields([&](auto& value) { reader.Value(&value); }, *state);
   Arrays([&](auto& values) { reader.Array(&values); }, *state);
+}
+
+bool ReadLatestCheckpoint(const std::filesystem::path& file, const std::string& settings, TrainState* state) {
+  const std::filesystem::path before = CheckpointBefore(file);
+  std::string wrong = file.string() + ": there is none";
+  try {
+    if (std::filesystem::exists(file)) {
+      ReadCheckpoint(file, settings, state);
+      return true;
+    }
+    if (!std::filesystem::exists(before)) return false;
+  } catch (const DamagedCheckpoint& damage) {
+    wrong = damage.what();
+    if (!std::filesystem::exists(before))
+      throw DamagedCheckpoint(wrong + "; train without --resume to start afresh");
+  }
+  try {
+    ReadCheckpoint(before, settings, state);
+  } catch (const DamagedCheckpoint&) {
+    throw DamagedCheckpoint(wrong + ", and so is the one before it, " + before.filename().string() +
+                            "; train without --resume to start afresh");
+  }
+  // In the damaged one's place, which would otherwise take this one's when the next is written.
+  std::error_code error;
+  std::filesystem::rename(before, file, error);
+  if (error) throw InputError(file.string() + ": cannot write: " + error.message());
+  Say(wrong + "; going on from the one before it, iteration " + std::to_string(state->iteration));
+  return true;
+}
+
+void RemoveCheckpoints(const std::filesystem::path& file) {
+  std::error_code there_is_none;
+  std::filesystem::remove(file, there_is_none);
+  std::filesystem::remove(CheckpointBefore(file), there_is_none);
 }
 
 }  // namespace lumen

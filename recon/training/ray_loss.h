@@ -13,6 +13,12 @@
 
 namespace lumen {
 
+// A gradient this large counts as not finite. Adam squares gradients: beyond 1e19 a float's square is
+// infinite, and the moment that holds it, and the parameter with it, would stand still for ever. An entry of
+// the grid gets products of two of the numbers that are looked at, over a cell of 1e-3 mm at the least:
+// (1e8)² · 1e3. A loss of about 1 has gradients of about 1.
+inline constexpr double kLargestGradient = 1e8;
+
 // Some rays with what their pixels show.
 template <class T>
 struct RayBatch {
@@ -72,7 +78,7 @@ class RayLoss {
   void GridBackward(int level, T* grid_gradient) const {
     field_->GridBackward(level, surface_, static_cast<int>(active_.size()), grid_gradient);
   }
-  // Whether everything that GridBackward spreads over the grid is finite.
+  // Whether everything that GridBackward spreads over the grid is below kLargestGradient.
   bool GridGradientIsFinite() const;
 
  private:

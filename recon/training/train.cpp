@@ -1,9 +1,12 @@
 #include "recon/training/train.h"
 
+#include <fmt/core.h>
+
 #include <chrono>
 #include <cmath>
 #include <ctime>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "common/error.h"
 #include "common/files.h"
@@ -11,6 +14,7 @@
 #include "common/progress.h"
 #include "recon/surface/extract.h"
 #include "recon/training/checkpoint.h"
+#include "recon/training/plausible.h"
 #include "recon/training/trainer.h"
 
 namespace lumen {
@@ -20,8 +24,15 @@ using Clock = std::chrono::steady_clock;
 
 constexpr double kReportSeconds = 1;
 
-// The share of steps without a finite gradient at which a run has failed.
+// A run has failed where at least so many steps were taken and this share of them, or all of the last so
+// many, had no finite gradient: nothing but the rays changes from one such step to the next.
+constexpr int64_t kFewSteps = 100;
 constexpr double kTooManySkipped = 0.5;
+
+// Training takes the photometric loss to a fifth of its start within seconds. Where half is left, what was
+// learnt explains little: colours that are stuck, poses or a light that fit nothing.
+constexpr double kMuchLeft = 0.5;
+constexpr double kMeanOver = 0.98;  // what the running mean of the loss keeps from step to step
 
 double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -38,10 +49,13 @@ class Run {
 
   TrainResult Go() {
     CreateFolder(run_.folder);
-    Resume();
+    if (run_.resume) Resume();
     WriteFile(run_.folder / "config.toml", settings_);
+    // Another run's would be taken for this one's if this one is killed before it has any.
+    if (!run_.resume) RemoveCheckpoints(run_.folder / "checkpoint");
     Optimise();
-    WriteCheckpoint(run_.folder / "checkpoint", settings_, trainer_.state());
+    if (saved_iteration_ != trainer_.state().iteration) Save();
+    SayWhichCamerasAreOutside();
     const Mesh mesh =
         ExtractMesh(trainer_.field(), trainer_.Weights(), trainer_.origin(), {options_.extract_cell_mm});
     if (mesh.faces.empty()) {
@@ -57,12 +71,23 @@ class Run {
 
   void Resume() {
     const auto file = run_.folder / "checkpoint";
-    if (!run_.resume) return;
-    if (!std::filesystem::exists(file))
+    if (!ReadLatestCheckpoint(file, settings_, &trainer_.state()))
       return Say("no checkpoint in " + run_.folder.string() + ": starting afresh");
-    ReadCheckpoint(file, settings_, &trainer_.state());
-    if (std::filesystem::exists(run_.folder / "log.jsonl")) log_ = ReadFile(run_.folder / "log.jsonl");
+    saved_iteration_ = trainer_.state().iteration;
+    ReadLog();
     Say("resuming at iteration " + std::to_string(trainer_.state().iteration));
+  }
+
+  // What was reported before the checkpoint; what came after it will be again.
+  void ReadLog() {
+    const auto file = run_.folder / "log.jsonl";
+    if (!std::filesystem::exists(file)) return;
+    std::istringstream lines(ReadFile(file));
+    for (std::string line; std::getline(lines, line);) {
+      const auto report = nlohmann::json::parse(line, nullptr, false);
+      if (!report.is_object() || report.value("iteration", int64_t(0)) > trainer_.state().iteration) break;
+      log_ += line + "\n";
+    }
   }
 
   double ProgressNow(double seconds) const {
@@ -90,9 +115,13 @@ class Run {
       if (!step.skipped) {
         loss += step.loss.Sum();
         ++loss_weight;
+        if (state.start_photometric == 0) state.start_photometric = step.loss.photometric;
+        if (photometric_ < 0) photometric_ = step.loss.photometric;
+        photometric_ = kMeanOver * photometric_ + (1 - kMeanOver) * step.loss.photometric;
       }
-      CheckSkipped();
-      if (elapsed - last_report >= kReportSeconds) {
+      skipped_in_a_row_ = step.skipped ? skipped_in_a_row_ + 1 : 0;
+      if (state.iteration >= kFewSteps) CheckSkipped();
+      if (elapsed - last_report >= kReportSeconds && loss_weight > 0) {
         last_report = elapsed;
         Report(seconds_before + elapsed, step, loss / loss_weight);
         progress.Update(done, "loss " + std::to_string(loss / loss_weight));
@@ -101,9 +130,11 @@ class Run {
       result_.final_loss = step.loss.Sum();
       if (elapsed - last_checkpoint >= options_.schedule.checkpoint_seconds) {
         last_checkpoint = elapsed;
-        WriteCheckpoint(run_.folder / "checkpoint", settings_, state);
+        Save();
       }
     }
+    CheckSkipped();
+    SayIfLittleLearnt();
     result_.seconds = seconds_before + SecondsSince(start);
     result_.cpu_seconds = static_cast<double>(std::clock() - cpu_start) / CLOCKS_PER_SEC;
     result_.iterations = state.iteration;
@@ -113,15 +144,41 @@ class Run {
     result_.skipped_steps = state.skipped_steps;
   }
 
+  void Save() {
+    WriteCheckpoint(run_.folder / "checkpoint", settings_, trainer_.state());
+    saved_iteration_ = trainer_.state().iteration;
+  }
+
   void CheckSkipped() const {
     const TrainState& state = trainer_.state();
-    if (state.iteration < 100 ||
-        state.skipped_steps <= kTooManySkipped * static_cast<double>(state.iteration))
-      return;
+    const bool too_many =
+        static_cast<double>(state.skipped_steps) > kTooManySkipped * static_cast<double>(state.iteration);
+    if (!too_many && skipped_in_a_row_ < kFewSteps) return;
     throw InputError(run_.folder.string() + ": training fails: " + std::to_string(state.skipped_steps) +
                      " of " + std::to_string(state.iteration) +
                      " steps had no finite gradient, the first at iteration " +
                      std::to_string(state.first_skipped_step) + "; lower schedule.learning_rate");
+  }
+
+  void SayIfLittleLearnt() const {
+    const TrainState& state = trainer_.state();
+    if (state.iteration < kFewSteps || photometric_ < kMuchLeft * state.start_photometric) return;
+    Say(fmt::format(
+        "training has learnt little: the photometric loss is {:.3g}, and was {:.3g} at the start; lower "
+        "schedule.learning_rate, train longer, or check poses, gains and light",
+        photometric_, state.start_photometric));
+  }
+
+  // What poses that are wrong, or a wall that was never seen, come to.
+  void SayWhichCamerasAreOutside() {
+    std::vector<Vec3d> places;
+    for (const Pose& pose : frames_.world_from_camera())
+      places.push_back(pose.translation() - trainer_.origin());
+    std::string outside;
+    for (size_t i : PlacesOutside(trainer_.field(), trainer_.Weights(), places))
+      outside += (outside.empty() ? "" : ", ") + std::to_string(frames_.number(static_cast<int>(i)));
+    if (outside.empty()) return;
+    Say("the cameras of these frames lie outside the reconstructed lumen; check their poses: " + outside);
   }
 
   void Report(double seconds, const StepReport& step, double mean_loss) {
@@ -147,6 +204,9 @@ class Run {
   Trainer trainer_;
   std::string settings_;
   std::string log_;
+  int64_t saved_iteration_ = -1;
+  int64_t skipped_in_a_row_ = 0;
+  double photometric_ = -1;  // running mean; none yet
   TrainResult result_;
 };
 

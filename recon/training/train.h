@@ -1,4 +1,5 @@
-// A training run from sequence to mesh, in a folder: mesh.ply, log.jsonl, config.toml, checkpoint.
+// A training run from sequence to mesh, in a folder: mesh.ply, log.jsonl, config.toml, checkpoint and
+// checkpoint.before.
 #pragma once
 
 #include <cstdint>

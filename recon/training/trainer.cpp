@@ -192,9 +192,11 @@ void Trainer::RunChunk(int index, const float* weights, const LossSettings<float
     chunk.terms += workspace->loss.Evaluate(weights, batch, lights_, state_.log_gain, settings,
                                             chunk.network_gradient.data(), chunk.log_gain_gradient.data());
   }
-  double sum = chunk.terms.Sum() + chunk.terms.by_log_sharpness;
-  for (float g : chunk.network_gradient) sum += g;
-  chunk.finite = std::isfinite(sum) && (!has_grid() || workspace->loss.GridGradientIsFinite());
+  double sum = std::abs(chunk.terms.Sum()) + std::abs(chunk.terms.by_log_sharpness);
+  for (float g : chunk.network_gradient) sum += std::abs(g);
+  for (float g : chunk.log_gain_gradient) sum += std::abs(g);
+  // Written so that NaN fails.
+  chunk.finite = sum < kLargestGradient && (!has_grid() || workspace->loss.GridGradientIsFinite());
   LeaveWorkspace(std::move(workspace), &chunk);
 }
 

@@ -28,7 +28,8 @@ struct TrainState {
   std::vector<float> log_gain, log_gain_first, log_gain_second;  // a frame; 0 where the gain is known
   // Where interreflection is by radiosity: a frame's DirectionMap after the other, as last computed.
   std::vector<float> surroundings;
-  int64_t skipped_steps = 0;  // whose loss or gradient was not finite
+  double start_photometric = 0;  // the first step's photometric loss, what training is measured by
+  int64_t skipped_steps = 0;     // whose loss or gradient was not finite
   int64_t first_skipped_step = -1;
 };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/error.h"
+#include "recon/training/plausible.h"
 
 namespace lumen {
 namespace {
@@ -24,23 +25,7 @@ double PatternAlong(const Light& light, const Vec3d& ray) {
 
 TrainingFrames::TrainingFrames(const Sequence& sequence, int count, bool lit)
     : calibration_(sequence.calibration), lit_(lit) {
-  const CameraIntrinsics& intrinsics = calibration_.camera;
-  const Image8 valid = ValidPixels(calibration_);
-  const Camera<double> camera(intrinsics);
-  std::vector<size_t> pixels;
-  for (int y = 0; y < intrinsics.height; ++y) {
-    for (int x = 0; x < intrinsics.width; ++x) {
-      if (*valid.Pixel(x, y) == 0) continue;
-      const auto ray = camera.Unproject(Vec2d(x, y));
-      if (!ray) continue;
-      const double vignetting = Vignetting(calibration_.response, ray->z());
-      if (vignetting < kHalfStep) continue;  // black whatever is there
-      pixels.push_back(size_t(y) * intrinsics.width + x);
-      rays_.push_back(ray->cast<float>());
-      vignetting_.push_back(static_cast<float>(vignetting));
-      pattern_.push_back(static_cast<float>(PatternAlong(calibration_.light, *ray)));
-    }
-  }
+  const std::vector<size_t> pixels = FindPixels();
   if (pixels.empty()) throw InputError(sequence.folder.string() + ": no pixel carries image; check the mask");
   for (int i = 0; i < 256; ++i) decoded_[i] = static_cast<float>(Decode(calibration_.response, i / 255.0));
 
@@ -59,9 +44,40 @@ TrainingFrames::TrainingFrames(const Sequence& sequence, int count, bool lit)
       frame.rgb.insert(frame.rgb.end(), color.data.begin() + 3 * pixel, color.data.begin() + 3 * pixel + 3);
     }
     frames_.push_back(std::move(frame));
+    numbers_.push_back(source.number);
     poses_.push_back(source.world_from_camera);
   }
-  if (lit_) FindScale();
+  CheckPoses(sequence.folder, numbers_, poses_);
+  if (lit_) FindScale(sequence);
+}
+
+std::vector<size_t> TrainingFrames::FindPixels() {
+  const Image8 valid = ValidPixels(calibration_);
+  const Camera<double> camera(calibration_.camera);
+  const Light& light = calibration_.light;
+  // Where the light's pattern is so dark that a wall which saturates the middle is black there, nothing is
+  // told; and far enough off its axis a narrow beam's exponential is no float at all.
+  double brightest = 0;
+  for (const LightSource& source : light.sources)
+    brightest = std::max(brightest, PatternAlong(light, source.direction));
+  const double darkest = lit_ ? brightest * std::pow(kHalfStep, 1 / inverse_gamma()) : 0;
+  std::vector<size_t> pixels;
+  for (int y = 0; y < valid.height; ++y) {
+    for (int x = 0; x < valid.width; ++x) {
+      if (*valid.Pixel(x, y) == 0) continue;
+      const auto ray = camera.Unproject(Vec2d(x, y));
+      if (!ray) continue;
+      const double vignetting = Vignetting(calibration_.response, ray->z());
+      if (vignetting < kHalfStep) continue;  // black whatever is there
+      const double pattern = PatternAlong(light, *ray);
+      if (pattern < darkest) continue;
+      pixels.push_back(size_t(y) * valid.width + x);
+      rays_.push_back(ray->cast<float>());
+      vignetting_.push_back(static_cast<float>(vignetting));
+      pattern_.push_back(static_cast<float>(pattern));
+    }
+  }
+  return pixels;
 }
 
 double TrainingFrames::inverse_gamma() const {
@@ -70,19 +86,31 @@ double TrainingFrames::inverse_gamma() const {
 
 double TrainingFrames::Normaliser(size_t pixel) const { return double(vignetting_[pixel]) * pattern_[pixel]; }
 
-void TrainingFrames::FindScale() {
+void TrainingFrames::FindScale(const Sequence& sequence) {
   double sum = 0;
-  size_t count = 0;
+  size_t count = 0, saturated = 0;
+  std::vector<double> radiance;  // a frame: the mean of what its pixels show at gain 1
   for (const Frame& frame : frames_) {
+    double shown = 0;
+    const size_t before = count;
     for (size_t pixel = 0; pixel < rays_.size(); pixel += 97) {
       for (int c = 0; c < 3; ++c, ++count) {
-        const double linear = decoded_[frame.rgb[3 * pixel + c]] / (frame.gain * Normaliser(pixel));
+        const uint8_t value = frame.rgb[3 * pixel + c];
+        const double linear = decoded_[value] / (frame.gain * Normaliser(pixel));
         sum += std::pow(linear, inverse_gamma());
+        shown += decoded_[value] / frame.gain;
+        saturated += value == 255;
       }
     }
+    radiance.push_back(shown / static_cast<double>(count - before));
   }
-  if (!(sum > 0))
-    throw InputError(calibration_.light.sources.empty() ? "no light source" : "all frames are black");
+  const std::string folder = sequence.folder.string();
+  if (calibration_.light.sources.empty()) throw InputError(folder + ": no light source");
+  if (!(sum > 0)) throw InputError(folder + ": all frames are black");
+  if (saturated == count) {
+    throw InputError(folder + ": all frames are white: saturated pixels say nothing of the wall's distance");
+  }
+  if (gains_known_) CheckGains(folder, numbers_, radiance);
   scale_ = std::pow(2 * sum / static_cast<double>(count), 1 / inverse_gamma());
 }
 

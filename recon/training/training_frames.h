@@ -14,10 +14,13 @@ class TrainingFrames {
  public:
   // Reads `count` frames taken uniformly over the sequence (all, if there are fewer). `lit`: normalise;
   // otherwise pixels stay as they are (NeuS). Throws InputError: a frame unreadable, no pixel valid, all
-  // pixels black.
+  // pixels black or all saturated, poses that no colon has room for. Says in a line what is odd about poses
+  // and gains.
   TrainingFrames(const Sequence& sequence, int count, bool lit);
 
   int size() const { return static_cast<int>(frames_.size()); }
+  // NNNN of a frame's files.
+  int number(int frame) const { return numbers_[frame]; }
   // Poses of the frames taken.
   const std::vector<Pose>& world_from_camera() const { return poses_; }
   const Light& light() const { return calibration_.light; }
@@ -41,11 +44,13 @@ class TrainingFrames {
     double gain;               // 1 where unknown
   };
   double Normaliser(size_t pixel) const;  // vignetting · L_e
-  void FindScale();
+  std::vector<size_t> FindPixels();       // fills what there is one of a pixel; their places in the image
+  void FindScale(const Sequence& sequence);
 
   Calibration calibration_;
   bool lit_;
   bool gains_known_ = true;
+  std::vector<int> numbers_;
   std::vector<Pose> poses_;
   std::vector<Frame> frames_;
   std::vector<Vec3f> rays_;
