@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include "common/abandoned_files.h"
 #include "common/files.h"
 #include "common/parallel.h"
 #include "common/random.h"
@@ -100,6 +101,26 @@ TEST(Reliability, KilledAgainAndAgain) {
   EXPECT_GT(kills, 0);
   ASSERT_EQ(ExitCode(Start(killed, true, folder / "said")), 0) << ReadFile(folder / "said");
   ExpectSameRun(folder / "whole", killed);
+}
+
+TEST(Reliability, WhatKilledProcessesLeftIsRemovedNothingElse) {
+  const ScratchFolder folder;
+  const pid_t gone = fork();
+  if (gone == 0) _exit(0);
+  ASSERT_EQ(ExitCode(gone), 0);
+  const std::string dead = std::to_string(gone), alive = std::to_string(getpid());
+  const std::vector<std::string> stay = {".mesh." + alive + "-0.tmp.ply",
+                                         "mesh." + dead + "-0.tmp.ply",
+                                         ".mesh." + dead + "-0.ply",
+                                         ".a-1.tmp",
+                                         ".tmp",
+                                         "-.tmp"};
+  for (const std::string& name : stay) WriteFile(folder / name, "");
+  WriteFile(folder / (".checkpoint." + dead + "-12.tmp"), "");
+  WriteFile(folder / (".mesh." + dead + "-3.tmp.ply"), "");
+  RemoveAbandonedFiles(folder.path());
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder.path()), {}), 6);
+  for (const std::string& name : stay) EXPECT_TRUE(fs::exists(folder / name)) << name;
 }
 
 // A run that was killed after some steps, its last checkpoint damaged in one of several ways.

@@ -88,6 +88,12 @@ void Arrays(Archive&& array, State& state) {
   array(state.surroundings);
 }
 
+void Rename(const std::filesystem::path& from, const std::filesystem::path& to) {
+  std::error_code error;
+  std::filesystem::rename(from, to, error);
+  if (error) throw InputError(to.string() + ": cannot write: " + error.message());
+}
+
 }  // namespace
 
 void WriteCheckpoint(const std::filesystem::path& file, const std::string& settings,
@@ -98,12 +104,12 @@ void WriteCheckpoint(const std::filesystem::path& file, const std::string& setti
   Fields([&](const auto& value) { writer.Value(value); }, state);
   Arrays([&](const auto& values) { writer.Array(values); }, state);
   writer.Value(Checksum(writer.bytes));
-  PendingFile pending(file);
-  WriteFile(pending.path(), writer.bytes);
-  // Killed between these two, a run leaves the one before alone, which is whole.
+  const std::filesystem::path next = file.string() + ".next";
+  WriteFile(next, writer.bytes);
+  // Killed between the next two, a run leaves the one before alone, which is whole.
   std::error_code there_is_none;
   std::filesystem::rename(file, CheckpointBefore(file), there_is_none);
-  pending.Commit();
+  Rename(next, file);
 }
 
 std::filesystem::path CheckpointBefore(const std::filesystem::path& file) {
@@ -154,9 +160,7 @@ bool ReadLatestCheckpoint(const std::filesystem::path& file, const std::string& 
                             "; train without --resume to start afresh");
   }
   // In the damaged one's place, which would otherwise take this one's when the next is written.
-  std::error_code error;
-  std::filesystem::rename(before, file, error);
-  if (error) throw InputError(file.string() + ": cannot write: " + error.message());
+  Rename(before, file);
   Say(wrong + "; going on from the one before it, iteration " + std::to_string(state->iteration));
   return true;
 }

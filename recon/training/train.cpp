@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
+#include "common/abandoned_files.h"
 #include "common/error.h"
 #include "common/files.h"
 #include "common/mesh.h"
@@ -49,6 +50,7 @@ class Run {
 
   TrainResult Go() {
     CreateFolder(run_.folder);
+    RemoveAbandonedFiles(run_.folder);
     if (run_.resume) Resume();
     WriteFile(run_.folder / "config.toml", settings_);
     // Another run's would be taken for this one's if this one is killed before it has any.
