@@ -13,7 +13,7 @@ shift $(($# < 2 ? $# : 2))
 lumen=${LUMEN:-$(dirname "$0")/../build/tools/lumen}
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
-options=(--quiet --iterations 400 --set sampling.rays=64 --set extract.cell_mm=3 --set grid.log2_table_size=12
+options=(--quiet --iterations 1500 --set sampling.rays=64 --set extract.cell_mm=3 --set grid.log2_table_size=12
          --set schedule.checkpoint_seconds=0 "$@")
 
 "$lumen" train "$sequence" -o "$scratch/whole" "${options[@]}" >/dev/null
@@ -21,7 +21,7 @@ RANDOM=1
 before=0 fell_back=0 ended=0
 for ((i = 0; i < kills; ++i)); do
   "$lumen" train "$sequence" -o "$scratch/killed" "${options[@]}" --resume >/dev/null 2>&1 &
-  sleep "$(printf '0.%03d' $((RANDOM % 600)))"
+  sleep "$(printf '0.%03d' $((RANDOM % 700)))"
   kill -9 $! 2>/dev/null || ended=$((ended + 1))
   wait $! 2>/dev/null || true
   if [[ -e $scratch/killed/checkpoint.before ]]; then
@@ -30,7 +30,7 @@ for ((i = 0; i < kills; ++i)); do
   fi
 done
 "$lumen" train "$sequence" -o "$scratch/killed" "${options[@]}" --resume >/dev/null
-echo "$kills runs: $((kills - ended)) killed, $ended had ended; $before left two checkpoints or the one before, $fell_back that alone"
+echo "$kills runs: $((kills - ended)) killed, $ended had ended; $before killed after the second checkpoint, $fell_back of them within its renames"
 left=$(find "$scratch/killed" -name '.*.tmp*' | wc -l)
 echo "$left temporary files are left"
 for name in checkpoint mesh.ply config.toml; do cmp "$scratch/whole/$name" "$scratch/killed/$name"; done

@@ -106,9 +106,13 @@ void WriteCheckpoint(const std::filesystem::path& file, const std::string& setti
   writer.Value(Checksum(writer.bytes));
   const std::filesystem::path next = file.string() + ".next";
   WriteFile(next, writer.bytes);
-  // Killed between the next two, a run leaves the one before alone, which is whole.
-  std::error_code there_is_none;
-  std::filesystem::rename(file, CheckpointBefore(file), there_is_none);
+  // By a second name, so that there is a checkpoint at every moment. Where the file system has no such links,
+  // a run that is killed between the two renames leaves the one before alone.
+  const std::filesystem::path before = CheckpointBefore(file);
+  std::error_code failed;
+  std::filesystem::remove(before, failed);
+  std::filesystem::create_hard_link(file, before, failed);
+  if (failed) std::filesystem::rename(file, before, failed);  // fails too where there is none yet
   Rename(next, file);
 }
 
