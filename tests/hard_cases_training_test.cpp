@@ -2,12 +2,15 @@
 // in one clear line. Kernels: hard_cases_kernels_test.cpp. Frames are 8-bit files, which hold no NaN; poses
 // and calibration can.
 #include <gtest/gtest.h>
+#include <sys/wait.h>
 
 #include <cmath>
+#include <cstdlib>
 
 #include "common/files.h"
 #include "common/image.h"
 #include "common/mesh.h"
+#include "common/pose_file.h"
 #include "common/progress.h"
 #include "common/random.h"
 #include "recon/evaluation/mesh_check.h"
@@ -244,6 +247,39 @@ TEST(HardCasesTraining, CamerasOutsideOrOnTheSurfaceAreNamed) {
   const std::vector<size_t> outside = PlacesOutside(
       field, parameters.data(), {Vec3d(0, 0, 0), Vec3d(25, 0, 0), Vec3d(0, 19.9, 0), Vec3d(0, 0, 20)});
   EXPECT_EQ(outside, (std::vector<size_t>{1, 3}));
+}
+
+// Where the truth is known, `lumen check` refuses such a sequence by frame.
+TEST(HardCasesTraining, CamerasOutsideTheTruthAreRefusedByCheck) {
+  const ScratchFolder folder;
+  std::filesystem::copy(SmallSequence().folder, folder / "out", std::filesystem::copy_options::recursive);
+  const auto check = [&] {
+    const std::string command = std::string(LUMEN_COMMAND) + " check " + (folder / "out").string() + " >" +
+                                (folder / "found").string() + " 2>&1";
+    return WEXITSTATUS(std::system(command.c_str()));
+  };
+  EXPECT_EQ(check(), 0) << ReadFile(folder / "found");
+  std::vector<Pose> poses;
+  for (const SequenceFrame& frame : SmallSequence().frames) poses.push_back(frame.world_from_camera);
+  const Mesh truth = ReadMesh(SmallSequence().ground_truth_mesh);
+  poses[2].translation() = Bounds(truth).max() + Vec3d(1, 1, 1);
+  // From the lumen through the wall's nearest place and a fifth of a millimetre on.
+  const Vec3d camera = poses[4].translation();
+  Vec3d nearest = truth.vertices[0];
+  for (const Vec3d& vertex : truth.vertices)
+    if ((vertex - camera).norm() < (nearest - camera).norm()) nearest = vertex;
+  poses[4].translation() = nearest + 0.2 * (nearest - camera).normalized();
+  WriteFile(folder / "out/pose.txt", PosesText(poses));
+  EXPECT_EQ(check(), 1);
+  const std::string found = ReadFile(folder / "found");
+  for (int frame : {0, 1, 3, 5}) {
+    EXPECT_EQ(found.find("frame " + std::to_string(frame) + ": the camera lies outside"), std::string::npos)
+        << found;
+  }
+  for (int frame : {2, 4}) {
+    EXPECT_NE(found.find("frame " + std::to_string(frame) + ": the camera lies outside"), std::string::npos)
+        << found;
+  }
 }
 
 bool AllFinite(const LineVector<float>& values) {

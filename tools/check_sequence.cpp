@@ -7,6 +7,7 @@
 #include "common/error.h"
 #include "common/parallel.h"
 #include "common/ray_scene.h"
+#include "recon/evaluation/mesh_check.h"
 #include "tools/findings.h"
 
 namespace lumen {
@@ -34,6 +35,7 @@ struct FrameContext {
   const Camera<double>& camera;
   const Image8& valid;
   const RayScene* truth;  // null = no mesh
+  bool truth_is_closed;
 
   std::string Name(const std::string& problem) const {
     return fmt::format("frame {}: {}", frame.number, problem);
@@ -194,8 +196,36 @@ void CheckDepth(const FrameContext& context, const ImageF& z_mm, Findings* findi
   }
 }
 
+// Rays all around a camera in the lumen meet the wall's inside, whichever way its faces are turned; outside
+// of the lumen they meet nothing or the wall's outside.
+bool IsInLumen(const RayScene& wall, const Vec3d& place) {
+  double volume = 0;  // six times it; > 0 where normals point out of the lumen
+  for (const Vec3i& face : wall.mesh().faces) {
+    const auto corner = [&](int k) { return Vec3d(wall.mesh().vertices[face[k]] - wall.anchor()); };
+    volume += corner(0).dot(corner(1).cross(corner(2)));
+  }
+  const float outwards = volume > 0 ? 1 : -1;
+  int inside = 0, all = 0;
+  for (int x = -1; x <= 1; ++x) {
+    for (int y = -1; y <= 1; ++y) {
+      for (int z = -1; z <= 1; ++z) {
+        if (x == 0 && y == 0 && z == 0) continue;
+        // Aside of the axes, along which meshes have their edges.
+        const Vec3f direction(x + 0.03f, y - 0.02f, z + 0.01f);
+        const RayHit hit = wall.Intersect(wall.ToLocal(place), direction, 0, 1e6f);
+        inside += hit.hit() && outwards * wall.face_normals()[hit.face].dot(direction) > 0;
+        ++all;
+      }
+    }
+  }
+  return 2 * inside > all;
+}
+
 void CheckFrame(const FrameContext& context, const SequenceFrame* before, Findings* findings) {
   const FrameImages images = LoadImages(context, findings);
+  if (context.truth_is_closed && !IsInLumen(*context.truth, context.frame.world_from_camera.translation())) {
+    findings->Error(context.Name("the camera lies outside the lumen of the ground truth's mesh"));
+  }
   if (!images.color.empty()) CheckColor(context, images.color, findings);
   if (!images.occlusion.empty()) CheckOcclusion(context, images.occlusion, findings);
   if (!images.z_mm.empty()) CheckDepth(context, images.z_mm, findings);
@@ -242,11 +272,12 @@ nlohmann::json CheckSequence(const Sequence& sequence, Findings* findings) {
       findings->Error(error.what());
     }
   }
+  const bool closed = truth && IsManifoldAndClosed(mesh);
   const Camera<double> camera(sequence.calibration.camera);
   const auto& frames = sequence.frames;
   std::vector<Findings> by_frame(frames.size());
   ParallelFor(0, static_cast<int64_t>(frames.size()), [&](int64_t i) {
-    const FrameContext context{sequence, frames[i], camera, valid, truth ? &*truth : nullptr};
+    const FrameContext context{sequence, frames[i], camera, valid, truth ? &*truth : nullptr, closed};
     CheckFrame(context, i > 0 ? &frames[i - 1] : nullptr, &by_frame[i]);
   });
   for (const Findings& of_frame : by_frame) findings->Append(of_frame);
