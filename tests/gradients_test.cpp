@@ -338,6 +338,95 @@ TEST_P(RayLossGradient, MatchesFiniteDifferences) {
   EXPECT_NEAR(gradient.back(), without.back(), 1e-12);
 }
 
+// Moves a frame's camera with its rays and lights.
+void MoveFrame(const double motion[kPoseNumbers], const Light& light, RayBatch<double>* batch,
+               FrameLight<double>* placed) {
+  const Vec3d shift(motion[0], motion[1], motion[2]), turn(motion[3], motion[4], motion[5]);
+  const double angle = turn.norm();
+  Pose pose = Pose::Identity();
+  if (angle > 0) pose.linear() = Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix();
+  pose.translation() = shift;
+  for (auto& ray : batch->rays) {
+    ray.origin = shift;
+    ray.direction = pose.linear() * ray.direction;
+  }
+  *placed = LightOfFrame<double>(light, pose, Vec3d::Zero());
+}
+
+// Where the colours don't see the normal, nothing is left out of the gradient by a camera's motion.
+TEST(PoseGradient, MatchesFiniteDifferences) {
+  FieldOptions options;
+  options.reflectance = Reflectance::kUnlit;
+  options.interreflection = Interreflection::kNone;
+  options.grid.levels = 3;
+  options.grid.log2_table_size = 9;
+  options.initial.radius_mm = 8;
+  options.initial.reach_mm = 10;
+  options.sdf_hidden = {9, 8};
+  options.color_hidden = {10};
+  options.features = 5;
+  const InitialSurface initial(options.initial, {Pose::Identity()}, Vec3d::Zero());
+  const Field<double> field(options, initial, kBox);
+  std::vector<double> parameters(field.parameter_count());
+  field.Initialise(1, parameters.data());
+  uint64_t state = 31;
+  for (double& p : parameters) p += 0.05 * Random(state);
+  // Directions and normals, which an unlit wall's colours see, are left out of the gradient too: take the
+  // columns of the first layer that look at them.
+  const size_t first = field.color_bias_begin() + 3 - (10 * (5 + 9) + 10 + 3 * 10 + 3);
+  const Vec3d looks(0.9, 0.1, 0.2);
+  Light light;
+  light.sources.push_back({Vec3d(1, 0.5, 0), Vec3d::UnitZ(), 2.0, Vec3d(300, 200, 150)});
+  RayBatch<double> start;
+  start.samples = 12;
+  for (int r = 0; r < 6; ++r) {
+    RayBatch<double>::Ray ray;
+    ray.origin = Vec3d::Zero();
+    ray.direction = Vec3d(Random(state), Random(state), 1.2).normalized();
+    ray.frame = 0;
+    ray.exposure = 1;
+    ray.floor = 1e-6;
+    ray.observed = looks;
+    ray.bound = {PixelBound::kExact, PixelBound::kExact, PixelBound::kExact};
+    ray.eikonal_sample = 2;
+    start.rays.push_back(ray);
+    for (int k = 0; k < 12; ++k) start.distance.push_back(1 + 1.2 * k + 0.3 * Random(state));
+  }
+  for (int row = 0; row < 10; ++row) {
+    for (int column = 8; column < 14; ++column) parameters[first + size_t(row) * 14 + column] = 0;
+  }
+  LossSettings<double> settings{0.9, 1 / 2.2, 0.0, 0.0, 0.1, 0.0, 0.0, 1.0 / 6};
+  RayLoss<double> ray_loss(&field);
+  std::vector<double> unused(field.network_size());
+  double motion[kPoseNumbers] = {0.3, 0.1, -0.2, 0.02, -0.03, 0.05}, unused_gain = 0;
+  std::vector<double> log_gain = {0.0};
+  auto loss = [&](double* pose_gradient) {
+    RayBatch<double> batch = start;
+    std::vector<FrameLight<double>> lights(1);
+    MoveFrame(motion, light, &batch, &lights[0]);
+    return ray_loss
+        .Evaluate(parameters.data(), batch, lights, log_gain, settings, unused.data(), &unused_gain,
+                  pose_gradient)
+        .Sum();
+  };
+  double gradient[kPoseNumbers] = {};
+  loss(gradient);
+  for (int i = 0; i < 3; ++i) {
+    const double expected = Difference([&] { return loss(nullptr); }, &motion[i]);
+    EXPECT_NEAR(gradient[i], expected, 1e-9) << i;
+    EXPECT_GT(std::abs(expected), 1e-6) << i;
+  }
+  // A rotation on top of the one that is there: its vector adds to first order about none.
+  for (double& m : motion) m = 0;
+  std::fill_n(gradient, kPoseNumbers, 0.0);
+  loss(gradient);
+  for (int i = 3; i < kPoseNumbers; ++i) {
+    const double expected = Difference([&] { return loss(nullptr); }, &motion[i]);
+    EXPECT_NEAR(gradient[i], expected, 1e-9) << i;
+    EXPECT_GT(std::abs(expected), 1e-6) << i;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Looks, RayLossGradient,
                          testing::Values(LookOfWall{Reflectance::kLambertian, Interreflection::kNone},
                                          LookOfWall{Reflectance::kLambertian, Interreflection::kMean},

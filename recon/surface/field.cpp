@@ -226,17 +226,11 @@ template <class T>
 void Field<T>::SurfaceBackward(const T* parameters, SurfacePass* pass, T* network_gradient) const {
   const int tiles = pass->positions.tiles();
   const int from_grid = grid_.outputs();
-  const int features = options_.features;
-  pass->output_delta.Resize(1 + features, tiles);
+  FillOutputDelta(pass);
   pass->direction.Resize(encoded() + 3, tiles);
   pass->scaled_direction.Resize(3, tiles);
   for (int tile = 0; tile < tiles; ++tile) {
     const T* own = pass->free.Row(tile, 0);
-    const T* value_delta = pass->value_delta.Row(tile, 0);
-    T* out = pass->output_delta.Row(tile, 0);
-    for (int s = 0; s < kTile; ++s) out[s] = unit_ * value_delta[s] * own[s];
-    const T* feature_delta = pass->color_input_delta.Tile(tile);
-    std::copy(feature_delta, feature_delta + features * kTile, pass->output_delta.Row(tile, 1));
     for (int d = 0; d < 3; ++d) {
       const T* u = pass->gradient_delta.Row(tile, d);
       T* by_place = pass->direction.Row(tile, encoded() + d);
@@ -259,6 +253,54 @@ void Field<T>::SurfaceBackward(const T* parameters, SurfacePass* pass, T* networ
   }
   sdf_.BackwardSecondOrder(parameters + grid_size(), pass->input, pass->output_delta, pass->direction,
                            &pass->sdf, network_gradient, &pass->input_delta);
+}
+
+template <class T>
+void Field<T>::FillOutputDelta(SurfacePass* pass) const {
+  const int features = options_.features;
+  pass->output_delta.Resize(1 + features, pass->positions.tiles());
+  for (int tile = 0; tile < pass->positions.tiles(); ++tile) {
+    const T* own = pass->free.Row(tile, 0);
+    const T* value_delta = pass->value_delta.Row(tile, 0);
+    T* out = pass->output_delta.Row(tile, 0);
+    for (int s = 0; s < kTile; ++s) out[s] = unit_ * value_delta[s] * own[s];
+    const T* feature_delta = pass->color_input_delta.Tile(tile);
+    std::copy(feature_delta, feature_delta + features * kTile, pass->output_delta.Row(tile, 1));
+  }
+}
+
+template <class T>
+void Field<T>::PositionsBackward(const T* parameters, SurfacePass* backward, T* unused_gradient,
+                                 Panel<T>* positions_delta) const {
+  FillOutputDelta(backward);
+  backward->direction.Resize(encoded() + 3, backward->positions.tiles());
+  backward->direction.SetZero();
+  sdf_.BackwardSecondOrder(parameters + grid_size(), backward->input, backward->output_delta,
+                           backward->direction, &backward->sdf, unused_gradient, &backward->input_delta);
+  const SurfacePass& pass = *backward;
+  const int from_grid = grid_.outputs();
+  positions_delta->Resize(3, pass.positions.tiles());
+  for (int tile = 0; tile < pass.positions.tiles(); ++tile) {
+    T base[kTile];
+    T* delta = positions_delta->Tile(tile);
+    StartFromInitial(pass.positions.Tile(tile), base, delta);
+    const T* value_delta = pass.value_delta.Row(tile, 0);
+    const T* own = pass.free.Row(tile, 0);
+    for (int d = 0; d < 3; ++d) {
+      T* out = delta + d * kTile;
+      const T* by_place = pass.input_delta.Row(tile, encoded() + d);
+      const T* by_color = pass.color_input_delta.Row(tile, options_.features + d);
+      for (int s = 0; s < kTile; ++s)
+        out[s] = out[s] * value_delta[s] * own[s] + (by_place[s] + by_color[s]) / unit_;
+      for (int r = 0; r < from_grid; ++r) {
+        const T* q = pass.input_delta.Row(tile, r);
+        const T* slope = pass.jacobian.Row(tile, d * from_grid + r);
+        for (int s = 0; s < kTile; ++s) out[s] += q[s] * slope[s];
+      }
+    }
+    place_frequency_.AddGradient(pass.input.Row(tile, from_grid), pass.input_delta.Row(tile, from_grid),
+                                 1 / unit_, delta);
+  }
 }
 
 template <class T>

@@ -110,10 +110,18 @@ class Field {
   void ColorBackward(const T* parameters, SurfacePass* pass, T* network_gradient) const;
   void SurfaceBackward(const T* parameters, SurfacePass* pass, T* network_gradient) const;
 
+  // Between ColorBackward and SurfaceBackward: ∂loss/∂positions, 3 rows, by way of the signed distances, the
+  // features and the colour network's own look at place. Left out: that normals change with place, which on
+  // a grid they do from cell to cell and not within (a part of it misleads: poses then err more than without
+  // it), and the ambient network, which is smooth. unused_gradient: room for the networks' parameters.
+  void PositionsBackward(const T* parameters, SurfacePass* pass, T* unused_gradient,
+                         Panel<T>* positions_delta) const;
+
   // What the backward pass leaves for one level of the grid, from the first `count` samples.
   void GridBackward(int level, const SurfacePass& pass, int count, T* grid_gradient) const;
 
  private:
+  void FillOutputDelta(SurfacePass* pass) const;
   bool sees_view() const { return options_.reflectance != Reflectance::kLambertian; }
   // Rows of the distance network's input before the three of place.
   int encoded() const { return grid_.outputs() + place_frequency_.outputs(); }

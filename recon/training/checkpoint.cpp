@@ -86,6 +86,9 @@ void Arrays(Archive&& array, State& state) {
   array(state.log_gain_first);
   array(state.log_gain_second);
   array(state.surroundings);
+  array(state.poses.values);
+  array(state.poses.first);
+  array(state.poses.second);
 }
 
 void Rename(const std::filesystem::path& from, const std::filesystem::path& to) {

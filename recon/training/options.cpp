@@ -176,6 +176,13 @@ void ReadRest(const ConfigTable& root, TrainOptions* options) {
     s.sharpness_end_per_mm = schedule->Number("sharpness_end_per_mm", s.sharpness_end_per_mm, kPositive);
     s.checkpoint_seconds = schedule->Number("checkpoint_seconds", s.checkpoint_seconds, kNotNegative);
   }
+  if (const auto poses = root.Optional("poses")) {
+    auto& p = options->poses;
+    p.refine = poses->Flag("refine", p.refine);
+    p.translation_rate_mm = poses->Number("translation_rate_mm", p.translation_rate_mm, kPositive);
+    p.rotation_rate_rad = poses->Number("rotation_rate_rad", p.rotation_rate_rad, kPositive);
+    p.start = poses->Number("start", p.start, {0, 1});
+  }
   if (const auto extract = root.Optional("extract")) {
     options->extract_cell_mm = extract->Number("cell_mm", options->extract_cell_mm, {1e-3, 1e3});
   }
@@ -270,6 +277,9 @@ std::string FormatTrainOptions(const TrainOptions& o) {
       << "\nsharpness_start_per_mm = " << o.schedule.sharpness_start_per_mm
       << "\nsharpness_end_per_mm = " << o.schedule.sharpness_end_per_mm
       << "\ncheckpoint_seconds = " << o.schedule.checkpoint_seconds
+      << "\n\n[poses]\nrefine = " << (o.poses.refine ? "true" : "false")
+      << "\ntranslation_rate_mm = " << o.poses.translation_rate_mm
+      << "\nrotation_rate_rad = " << o.poses.rotation_rate_rad << "\nstart = " << o.poses.start
       << "\n\n[extract]\ncell_mm = " << o.extract_cell_mm << "\n";
   return out.str();
 }

@@ -72,6 +72,14 @@ struct TrainOptions {
     double checkpoint_seconds = 10;  // between checkpoints
   } schedule;
 
+  struct Poses {
+    bool refine = false;
+    // Adam's, from `start` (a part of the run) on; from the middle of the run they fall to 0.
+    double translation_rate_mm = 2e-3;
+    double rotation_rate_rad = 5e-5;
+    double start = 0.05;
+  } poses;
+
   double extract_cell_mm = 0.75;
 };
 

@@ -218,7 +218,8 @@ double RayLoss<T>::Pull(T strength, T width, const Panel<T>& output, int row, Pa
 template <class T>
 LossTerms RayLoss<T>::Evaluate(const T* parameters, const RayBatch<T>& batch,
                                const std::vector<FrameLight<T>>& lights, const std::vector<T>& log_gain,
-                               const LossSettings<T>& settings, T* network_gradient, T* log_gain_gradient) {
+                               const LossSettings<T>& settings, T* network_gradient, T* log_gain_gradient,
+                               T* pose_gradient) {
   LossTerms terms;
   FindWeights(parameters, batch, settings);
   SelectActive(batch, settings);
@@ -227,6 +228,7 @@ LossTerms RayLoss<T>::Evaluate(const T* parameters, const RayBatch<T>& batch,
   terms.photometric = ComparePixels(batch, log_gain, settings, log_gain_gradient);
   BackToSamples(batch, settings, &terms);
   field_->ColorBackward(parameters, &surface_, network_gradient);
+  if (pose_gradient) AddPoseGradient(parameters, batch, pose_gradient);
 
   const T eikonal_share = settings.eikonal_weight * settings.per_ray / T(batch.samples);
   for (size_t i = 0; i < active_.size(); ++i) {
@@ -247,6 +249,26 @@ LossTerms RayLoss<T>::Evaluate(const T* parameters, const RayBatch<T>& batch,
   }
   field_->SurfaceBackward(parameters, &surface_, network_gradient);
   return terms;
+}
+
+// Samples keep their places in the camera's axes, and so the light that comes to them from the moving guides.
+// That the light turns against normals which stay is left out with its counterpart, that other places have
+// other normals (PositionsBackward): the two make up for each other where the wall is smooth.
+template <class T>
+void RayLoss<T>::AddPoseGradient(const T* parameters, const RayBatch<T>& batch, T* pose_gradient) {
+  unused_gradient_.assign(field_->network_size(), T(0));
+  field_->PositionsBackward(parameters, &surface_, unused_gradient_.data(), &positions_delta_);
+  for (size_t i = 0; i < active_.size(); ++i) {
+    const auto& ray = batch.rays[active_[i].ray];
+    const T distance = batch.distance[size_t(active_[i].ray) * batch.samples + active_[i].sample];
+    const Vec3<T> by_place(positions_delta_.At(0, i), positions_delta_.At(1, i), positions_delta_.At(2, i));
+    const Vec3<T> by_rotation = (distance * ray.direction).cross(by_place);
+    T* sum = pose_gradient + ray.frame * kPoseNumbers;
+    for (int d = 0; d < 3; ++d) {
+      sum[d] += by_place[d];
+      sum[3 + d] += by_rotation[d];
+    }
+  }
 }
 
 template <class T>

@@ -64,6 +64,10 @@ struct LossTerms {
   LossTerms& operator+=(const LossTerms& other);
 };
 
+// What a pose can move by: a translation, mm, and a rotation vector about the camera's place, rad, in the
+// axes of the field.
+inline constexpr int kPoseNumbers = 6;
+
 // Computes on one batch at a time, reusing its memory.
 template <class T>
 class RayLoss {
@@ -71,10 +75,12 @@ class RayLoss {
   explicit RayLoss(const Field<T>* field) : field_(field) {}
 
   // Loss of a batch. Adds the gradient by the networks' parameters to network_gradient and by each frame's
-  // log gain to log_gain_gradient; the grid's part waits for GridBackward.
+  // log gain to log_gain_gradient; the grid's part waits for GridBackward. pose_gradient: null, or
+  // kPoseNumbers a frame, to which is added the gradient by a motion of the frame's camera with its rays,
+  // their samples and its lights, normals standing still (Field::PositionsBackward).
   LossTerms Evaluate(const T* parameters, const RayBatch<T>& batch, const std::vector<FrameLight<T>>& lights,
                      const std::vector<T>& log_gain, const LossSettings<T>& settings, T* network_gradient,
-                     T* log_gain_gradient);
+                     T* log_gain_gradient, T* pose_gradient = nullptr);
   void GridBackward(int level, T* grid_gradient) const {
     field_->GridBackward(level, surface_, static_cast<int>(active_.size()), grid_gradient);
   }
@@ -94,6 +100,7 @@ class RayLoss {
   double ComparePixels(const RayBatch<T>& batch, const std::vector<T>& log_gain,
                        const LossSettings<T>& settings, T* log_gain_gradient);
   double Pull(T strength, T width, const Panel<T>& output, int row, Panel<T>* delta);
+  void AddPoseGradient(const T* parameters, const RayBatch<T>& batch, T* pose_gradient);
   void BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& settings, LossTerms* terms);
 
   const Field<T>* field_;
@@ -105,6 +112,8 @@ class RayLoss {
   std::vector<Active> active_;
   std::vector<Shading<T>> shading_;  // an active sample
   std::vector<Term<T>> pull_;        // on one of its outputs
+  Panel<T> positions_delta_;
+  LineVector<T> unused_gradient_;
 };
 
 }  // namespace lumen

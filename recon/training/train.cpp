@@ -12,6 +12,7 @@
 #include "common/error.h"
 #include "common/files.h"
 #include "common/mesh.h"
+#include "common/pose_file.h"
 #include "common/progress.h"
 #include "recon/surface/extract.h"
 #include "recon/training/checkpoint.h"
@@ -65,6 +66,7 @@ class Run {
                        ": training left no surface; check poses and light, or train longer");
     }
     WriteMesh(run_.folder / "mesh.ply", mesh);
+    if (options_.poses.refine) WriteFile(run_.folder / "pose.txt", PosesText(trainer_.Poses()));
     return result_;
   }
 

@@ -56,6 +56,7 @@ Trainer::Trainer(const TrainingFrames& frames, const TrainOptions& options, uint
     chunk.rays = std::min(kChunkRays, options.sampling.rays - begin);
     chunk.network_gradient.assign(field_->network_size(), 0.0f);
     chunk.log_gain_gradient.assign(frames.size(), 0.0f);
+    if (options.poses.refine) chunk.pose_gradient.assign(size_t(frames.size()) * kPoseNumbers, 0.0f);
     chunks_.push_back(std::move(chunk));
   }
   norm_ = field_->Normalisation();
@@ -67,6 +68,7 @@ Trainer::Trainer(const TrainingFrames& frames, const TrainOptions& options, uint
   state_.log_gain.assign(frames.size(), 0.0f);
   state_.log_gain_first = state_.log_gain_second = state_.log_gain;
   state_.log_sharpness[0] = static_cast<float>(std::log(options.schedule.sharpness_start_per_mm));
+  if (options.poses.refine) state_.poses.Resize(frames.size());
   if (has_surroundings()) {
     state_.surroundings.assign(static_cast<size_t>(frames.size()) * DirectionMap<float>::kCells * 3, 0.0f);
   }
@@ -186,15 +188,18 @@ void Trainer::RunChunk(int index, const float* weights, const LossSettings<float
     for (size_t r = 0; r < batch.rays.size(); ++r) {
       frames_.Draw(RandomBits(step_key, static_cast<uint64_t>(index) * kChunkRays + begin + r), origin_,
                    &batch.rays[r]);
+      if (refines_poses()) Move(state_.poses, &batch.rays[r]);
     }
     workspace->sampler->Place(weights, options_.sampling, settings.sharpness,
                               RandomBits(step_key, static_cast<uint64_t>(index), 1 + begin), &batch);
-    chunk.terms += workspace->loss.Evaluate(weights, batch, lights_, state_.log_gain, settings,
-                                            chunk.network_gradient.data(), chunk.log_gain_gradient.data());
+    chunk.terms += workspace->loss.Evaluate(
+        weights, batch, lights_, state_.log_gain, settings, chunk.network_gradient.data(),
+        chunk.log_gain_gradient.data(), chunk.pose_gradient.empty() ? nullptr : chunk.pose_gradient.data());
   }
   double sum = std::abs(chunk.terms.Sum()) + std::abs(chunk.terms.by_log_sharpness);
   for (float g : chunk.network_gradient) sum += std::abs(g);
   for (float g : chunk.log_gain_gradient) sum += std::abs(g);
+  for (float g : chunk.pose_gradient) sum += std::abs(g);
   // Written so that NaN fails.
   chunk.finite = sum < kLargestGradient && (!has_grid() || workspace->loss.GridGradientIsFinite());
   LeaveWorkspace(std::move(workspace), &chunk);
@@ -208,6 +213,7 @@ void Trainer::ClearChunks() {
   for (Chunk& chunk : chunks_) {
     std::fill(chunk.network_gradient.begin(), chunk.network_gradient.end(), 0.0f);
     std::fill(chunk.log_gain_gradient.begin(), chunk.log_gain_gradient.end(), 0.0f);
+    std::fill(chunk.pose_gradient.begin(), chunk.pose_gradient.end(), 0.0f);
   }
 }
 
@@ -232,6 +238,38 @@ void Trainer::UpdateGains(const AdamStep& step) {
   // The first frame's gain is 1: the others' are relative to it.
   AdamUpdate(step, gradient.size() - 1, state_.log_gain.data() + 1, gradient.data() + 1,
              state_.log_gain_first.data() + 1, state_.log_gain_second.data() + 1);
+}
+
+// Not before the surface has taken some shape, and ever more slowly in the second half.
+void Trainer::UpdatePoses(double progress) {
+  const auto& poses = options_.poses;
+  std::vector<float> gradient(state_.poses.values.size(), 0.0f);
+  for (Chunk& chunk : chunks_) {
+    for (size_t i = 0; i < gradient.size(); ++i) gradient[i] += chunk.pose_gradient[i];
+    std::fill(chunk.pose_gradient.begin(), chunk.pose_gradient.end(), 0.0f);
+  }
+  if (progress < poses.start) return;
+  const double decay = std::min(1.0, 2 * (1 - progress));
+  const double beta2 = options_.schedule.adam_beta2;
+  UpdateMotions(AdamStep(poses.translation_rate_mm * decay, state_.iteration, beta2),
+                AdamStep(poses.rotation_rate_rad * decay, state_.iteration, beta2), &gradient, &state_.poses);
+}
+
+std::vector<Pose> Trainer::Poses() const {
+  std::vector<Pose> poses = frames_.world_from_camera();
+  for (int i = 0; refines_poses() && i < frames_.size(); ++i) poses[i] = Moved(poses[i], state_.poses, i);
+  return poses;
+}
+
+// The guides move with the camera.
+void Trainer::PlaceLights() {
+  const std::vector<Pose> poses = Poses();
+  for (size_t i = 0; i < lights_.size(); ++i) {
+    FrameLight<float> moved = LightOfFrame<float>(frames_.light(), poses[i], origin_);
+    moved.mean_radiance = lights_[i].mean_radiance;
+    moved.surroundings = std::move(lights_[i].surroundings);
+    lights_[i] = std::move(moved);
+  }
 }
 
 void Trainer::UpdateSharpness(double rate, double gradient) {
@@ -266,6 +304,7 @@ void Trainer::UpdateSurroundings() {
 }
 
 StepReport Trainer::Step(double progress) {
+  if (refines_poses()) PlaceLights();
   if (has_surroundings()) UpdateSurroundings();
   const LossSettings<float> settings = SettingsAt(progress);
   const float* weights = Weights();
@@ -294,6 +333,7 @@ StepReport Trainer::Step(double progress) {
                &state_.first[begin], &state_.second[begin]);
   });
   UpdateGains(step);
+  if (refines_poses()) UpdatePoses(progress);
   UpdateSharpness(rate, report.loss.by_log_sharpness);
   return report;
 }

@@ -11,6 +11,7 @@
 
 #include "recon/network/adam.h"
 #include "recon/training/options.h"
+#include "recon/training/pose_refinement.h"
 #include "recon/training/ray_loss.h"
 #include "recon/training/ray_sampler.h"
 #include "recon/training/training_frames.h"
@@ -26,6 +27,7 @@ struct TrainState {
   LineVector<float> parameters, first, second;
   std::array<float, 3> log_sharpness = {};  // of s in 1/mm, and its moments; where it is learnt
   std::vector<float> log_gain, log_gain_first, log_gain_second;  // a frame; 0 where the gain is known
+  PoseMotions poses;                                             // where they are refined
   // Where interreflection is by radiosity: a frame's DirectionMap after the other, as last computed.
   std::vector<float> surroundings;
   double start_photometric = 0;  // the first step's photometric loss, what training is measured by
@@ -50,6 +52,8 @@ class Trainer {
   const Field<float>& field() const { return *field_; }
   // The field's parameters as they are now.
   const float* Weights();
+  // Poses of the frames trained on, as they are refined so far.
+  std::vector<Pose> Poses() const;
   // World point that the field's coordinates count from.
   const Vec3d& origin() const { return origin_; }
   TrainState& state() { return state_; }
@@ -71,6 +75,7 @@ class Trainer {
     std::unique_ptr<Workspace> workspace;
     LineVector<float> network_gradient;
     std::vector<float> log_gain_gradient;
+    std::vector<float> pose_gradient;  // empty where poses stay as they are given
     LossTerms terms;
     bool finite = true;  // loss and gradient
   };
@@ -86,6 +91,9 @@ class Trainer {
   void UpdateSurroundings();
   void UpdateNetworks(const AdamStep& step);
   void UpdateGains(const AdamStep& step);
+  bool refines_poses() const { return state_.poses.frames() > 0; }
+  void UpdatePoses(double progress);
+  void PlaceLights();
   void UpdateSharpness(double rate, double gradient);
   void MatchColorsToInitialSurface(const InitialSurface& initial);
 
