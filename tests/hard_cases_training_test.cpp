@@ -15,6 +15,7 @@
 #include "common/random.h"
 #include "recon/evaluation/mesh_check.h"
 #include "recon/training/plausible.h"
+#include "recon/training/ray_sampler.h"
 #include "recon/training/train.h"
 #include "recon/training/trainer.h"
 #include "tests/finite_difference.h"
@@ -304,6 +305,43 @@ TEST(HardCasesTraining, LearningRatesTooHigh) {
   EXPECT_EQ(state.skipped_steps, skipped);
   EXPECT_GE(state.first_skipped_step, 0);
   EXPECT_TRUE(AllFinite(state.parameters) && AllFinite(state.first) && AllFinite(state.second));
+}
+
+// Whatever the field's values have become, samples are finite, in order and on their ray: sorting numbers
+// that aren't would write beyond its end.
+TEST(HardCasesTraining, SamplersOnFieldsThatAreNotFinite) {
+  FieldOptions options;
+  options.initial.radius_mm = 20;
+  const InitialSurface initial(options.initial, {Pose::Identity()}, Vec3d::Zero());
+  const Field<float> field(options, initial, {Vec3d::Constant(-60), Vec3d::Constant(60)});
+  const float infinity = std::numeric_limits<float>::infinity();
+  for (const std::string sampler : {"guided", "importance"}) {
+    const TrainOptions::Sampling sampling =
+        ReadTrainOptions("fast", {"sampling.sampler=\"" + sampler + "\""}).sampling;
+    for (const float spoilt : {std::nanf(""), infinity, -infinity, 3e38f, 1e20f}) {
+      uint64_t state = 9;
+      std::vector<float> parameters(field.parameter_count());
+      field.Initialise(1, parameters.data());
+      for (float& parameter : parameters)
+        if (Random(state) > 0.9) parameter = Random(state) > 0 ? spoilt : -spoilt;
+      RayBatch<float> batch;
+      batch.rays.resize(64);
+      for (auto& ray : batch.rays) {
+        ray.origin = Vec3f(3, 0, 0);
+        ray.direction = Vec3d(Random(state), Random(state), Random(state)).normalized().cast<float>();
+      }
+      MakeRaySampler(sampling, &field)->Place(parameters.data(), sampling, 1, 7, &batch);
+      for (size_t r = 0; r < batch.rays.size(); ++r) {
+        const auto begin = batch.distance.begin() + static_cast<std::ptrdiff_t>(r) * batch.samples;
+        EXPECT_TRUE(std::is_sorted(begin, begin + batch.samples));
+        const float far = FarthestSample(field.box(), batch.rays[r].origin, batch.rays[r].direction);
+        for (int k = 0; k < batch.samples; ++k) {
+          ASSERT_TRUE(begin[k] >= kNearest_mm && begin[k] <= far) << spoilt << " " << begin[k];
+        }
+        ASSERT_TRUE(batch.rays[r].eikonal_sample >= 0 && batch.rays[r].eikonal_sample < batch.samples);
+      }
+    }
+  }
 }
 
 // A beam so narrow that a float's exponential is 0 at the image's rim: those pixels say nothing, the others

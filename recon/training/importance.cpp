@@ -54,7 +54,8 @@ void ImportanceSampler::AddRound(const float* parameters, int count, float sharp
       const float middle = (from.value + to.value) / 2, half = steepest * length / 2;
       const float change = LogSigmoid(sharpness * (middle + half)) - LogSigmoid(sharpness * (middle - half));
       const float alpha = -std::expm1(std::min(change, 0.0f));
-      weight_[i] = alpha * transmittance + kLeastWeight;
+      const float opacity = alpha * transmittance;
+      weight_[i] = (opacity > 0 ? opacity : 0) + kLeastWeight;  // written so that NaN weighs least
       total += weight_[i];
       transmittance *= 1 - alpha;
     }

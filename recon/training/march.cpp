@@ -14,6 +14,14 @@ constexpr int kSecantSteps = 3;
 // along the ray than its width, but by no more than five times is it followed.
 constexpr float kShallowest = 0.2f;
 
+// Where the values at two distances, the former the larger, would be 0, as far as that is between them. The
+// nearer distance where they aren't finite: distances stay in order whatever the field has become.
+float ZeroBetween(float near, float far, float near_value, float far_value) {
+  const float fall = near_value - far_value;
+  const float zero = fall > 0 ? near + (far - near) * (near_value / fall) : near;
+  return zero > near ? std::min(zero, far) : near;
+}
+
 }  // namespace
 
 void Marcher::FindCrossings(const float* parameters, const TrainOptions::Sampling& options, uint64_t key,
@@ -43,9 +51,7 @@ void Marcher::FindCrossings(const float* parameters, const TrainOptions::Samplin
   for (int step = 0; step < kSecantSteps; ++step) {
     for (int r = 0; r < rays; ++r) {
       const Crossing& c = crossings_[r];
-      const float fall = c.inside_value - c.outside_value;
-      look_[r] = fall > 0 ? c.inside + (c.outside - c.inside) * (c.inside_value / fall) : c.inside;
-      look_[r] = std::clamp(look_[r], c.inside, c.outside);
+      look_[r] = ZeroBetween(c.inside, c.outside, c.inside_value, c.outside_value);
     }
     LookAlongRays(*field_, parameters, batch, look_, &pass_);
     for (int r = 0; r < rays; ++r) {
@@ -70,10 +76,9 @@ void Marcher::Place(const float* parameters, const TrainOptions::Sampling& optio
   batch->distance.resize(batch->rays.size() * n);
   for (size_t r = 0; r < batch->rays.size(); ++r) {
     const Crossing& c = crossings_[r];
-    const float fall = c.inside_value - c.outside_value, gap = c.outside - c.inside;
-    const float meets =
-        fall > 0 ? std::clamp(c.inside + gap * (c.inside_value / fall), c.inside, c.outside) : c.inside;
-    const float steepness = gap > 0 ? std::clamp(fall / gap, kShallowest, 1.0f) : 1.0f;
+    const float meets = ZeroBetween(c.inside, c.outside, c.inside_value, c.outside_value);
+    const float gap = c.outside - c.inside, slope = (c.inside_value - c.outside_value) / gap;
+    const float steepness = gap > 0 && slope < 1 ? std::max(slope, kShallowest) : 1.0f;
     const float spacing = static_cast<float>(options.surface_spacing) / (sharpness * steepness);
     float* distance = &batch->distance[r * n];
     const float last = std::clamp(meets + 0.5f * options.surface * spacing, 2 * kNearest_mm, far_[r]);
