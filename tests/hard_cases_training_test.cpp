@@ -1,6 +1,6 @@
 // Sequences that are hard on the reconstructor: each ends with a closed, finite mesh around its cameras, or
-// in one clear line. Kernels: hard_cases_kernels_test.cpp. Frames are 8-bit files, which hold no NaN; poses
-// and calibration can.
+// in one clear line. Kernels: hard_cases_kernels_test.cpp, hard_cases_network_test.cpp. Frames are 8-bit
+// files, which hold no NaN; poses and calibration can.
 #include <gtest/gtest.h>
 #include <sys/wait.h>
 
