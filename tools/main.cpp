@@ -24,6 +24,7 @@ int main(int argc, char** argv) {
   lumen::AddCheck(&app);
   lumen::AddPhotometry(&app);
   lumen::AddCost(&app);
+  lumen::AddBudget(&app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

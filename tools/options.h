@@ -29,5 +29,6 @@ void AddLoop(CLI::App* app);
 void AddCheck(CLI::App* app);
 void AddPhotometry(CLI::App* app);
 void AddCost(CLI::App* app);
+void AddBudget(CLI::App* app);
 
 }  // namespace lumen

@@ -103,14 +103,7 @@ std::vector<EffectSwitch> SwitchesOf(const Scene& scene) {
          s->surface.bounced_coat.reset();
        }},
       {"subsurface", [](Scene* s) { s->surface.subsurface.reset(); }},
-      // One source at the camera that is as strong as all.
-      {"offset_guides",
-       [](Scene* s) {
-         std::vector<LightSource>& sources = s->calibration.light.sources;
-         for (size_t i = 1; i < sources.size(); ++i) sources[0].intensity += sources[i].intensity;
-         sources.resize(1);
-         sources[0].position.setZero();
-       }},
+      {"offset_guides", [](Scene* s) { MoveToCamera(&s->calibration.light); }},
       {"vignetting", [](Scene* s) { s->calibration.response.vignetting = 0; }},
       {"defocus", [](Scene* s) { s->defocus.reset(); }},
       {"chromatic_aberration", [](Scene* s) { s->chromatic_aberration.reset(); }},
@@ -124,6 +117,13 @@ std::vector<EffectSwitch> SwitchesOf(const Scene& scene) {
     if (std::ranges::find(scene.effects, effect.name) != scene.effects.end()) present.push_back(effect);
   }
   return present;
+}
+
+void MoveToCamera(Light* light) {
+  std::vector<LightSource>& sources = light->sources;
+  for (size_t i = 1; i < sources.size(); ++i) sources[0].intensity += sources[i].intensity;
+  sources.resize(1);
+  sources[0].position.setZero();
 }
 
 }  // namespace lumen

@@ -38,4 +38,7 @@ struct EffectSwitch {
 // The effects that this scene has and that can be taken out of it.
 std::vector<EffectSwitch> SwitchesOf(const Scene& scene);
 
+// One source at the camera that is as strong as all.
+void MoveToCamera(Light* light);
+
 }  // namespace lumen

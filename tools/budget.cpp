@@ -1,0 +1,140 @@
+#include "study/budget.h"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+
+#include "common/error.h"
+#include "common/files.h"
+#include "common/progress.h"
+#include "study/budget_table.h"
+#include "tools/options.h"
+#include "tools/scaled_scene.h"
+#include "tools/train_arguments.h"
+
+namespace lumen {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Arguments {
+  fs::path scene, folder;
+  std::vector<std::string> settings, effects;
+  double scale = 0;  // 0 = not said
+  TrainArguments train;
+  int seeds = 0;  // 0 = not said
+  bool quick = false;
+};
+
+// What holds where nothing else is said: differences show long before a run is at its best.
+constexpr double kScale = 0.5, kQuickScale = 0.2;
+constexpr int64_t kIterations = 1500, kQuickIterations = 250;
+constexpr const char *kCell = "extract.cell_mm=1", *kQuickCell = "extract.cell_mm=2";
+constexpr int kSeeds = 3, kQuickSeeds = 1;
+
+TrainOptions OwnOptions(const Arguments& arguments) {
+  TrainArguments train = arguments.train;
+  train.settings.insert(train.settings.begin(), arguments.quick ? kQuickCell : kCell);
+  if (train.iterations == 0 && train.seconds == 0) {
+    train.iterations = arguments.quick ? kQuickIterations : kIterations;
+  }
+  return ReadTrainOptions(train.preset, train.Settings());
+}
+
+std::vector<BudgetEffect> EffectsToMeasure(const Arguments& arguments, const Scene& scene) {
+  const std::vector<BudgetEffect> all = BudgetEffectsOf(scene, arguments.scene.string());
+  if (arguments.effects.empty()) return all;
+  std::vector<BudgetEffect> named;
+  for (const std::string& name : arguments.effects) {
+    const auto effect = std::ranges::find(all, name, &BudgetEffect::name);
+    if (effect == all.end()) {
+      std::string known;
+      for (const BudgetEffect& other : all) known += (known.empty() ? "" : ", ") + other.name;
+      throw InputError("--effect " + name + ": this scene has no such effect; there are: " + known);
+    }
+    named.push_back(*effect);
+  }
+  return named;
+}
+
+// The scene without the effects that aren't asked for.
+void LeaveOutOthers(const std::vector<BudgetEffect>& effects, const Arguments& arguments, Scene* scene) {
+  for (const BudgetEffect& effect : BudgetEffectsOf(*scene, arguments.scene.string())) {
+    const bool asked = std::ranges::count(effects, effect.name, &BudgetEffect::name) > 0;
+    if (!asked && effect.leave_out) effect.leave_out(scene);
+  }
+}
+
+// What the runs follow from besides their options: the scene's file, the command line and the effects.
+std::string SubjectOf(const Arguments& arguments, const std::vector<BudgetEffect>& effects, double scale,
+                      uint64_t seed) {
+  std::string subject = fmt::format("scale = {}\nseed = {}\n", scale, seed);
+  for (const BudgetEffect& effect : effects) subject += "effect = " + effect.name + "\n";
+  for (const std::string& setting : arguments.settings) subject += setting + "\n";
+  return subject + ReadFile(arguments.scene);
+}
+
+std::string TitleOf(const Arguments& arguments, const Scene& scene, const BudgetOptions& options) {
+  const CameraIntrinsics& camera = scene.calibration.camera;
+  const auto& schedule = options.train.schedule;
+  const std::string length = schedule.seconds > 0 ? fmt::format("{} s", schedule.seconds)
+                                                  : fmt::format("{} iterations", schedule.iterations);
+  return fmt::format("{}: {} frames of {}×{} pixels, {}, {} seed{}", arguments.scene.filename().string(),
+                     scene.world_from_camera.size(), camera.width, camera.height, length, options.seeds,
+                     options.seeds == 1 ? "" : "s");
+}
+
+nlohmann::json Run(const Arguments& arguments, const CommonOptions& common) {
+  BudgetOptions options;
+  options.train = OwnOptions(arguments);
+  options.seeds = arguments.seeds > 0 ? arguments.seeds : arguments.quick ? kQuickSeeds : kSeeds;
+  options.seed = common.seed;
+  options.folder = arguments.folder;
+  const double scale = arguments.scale > 0 ? arguments.scale : arguments.quick ? kQuickScale : kScale;
+  Scene scene = ReadScaledScene(arguments.scene, arguments.settings, common.seed, scale);
+  const std::vector<BudgetEffect> effects = EffectsToMeasure(arguments, scene);
+  LeaveOutOthers(effects, arguments, &scene);
+  options.subject = SubjectOf(arguments, effects, scale, common.seed);
+  const Budget budget = MeasureBudget(scene, effects, options);
+
+  const std::string title = TitleOf(arguments, scene, options);
+  fmt::print("{}\n{}", title, ToTable(budget));
+  WriteFile(arguments.folder / "budget.csv", ToCsv(budget));
+  const Drawing page = DrawBudget(budget, title);
+  WriteFile(arguments.folder / "budget.svg", ToSvg(page));
+  WriteImage(arguments.folder / "budget.png", ToImage(page));
+  Say("table and pictures in " + arguments.folder.string());
+  nlohmann::json result = ToJson(budget);
+  result["scene"] = arguments.scene.string();
+  result["scale"] = scale;
+  result["seeds"] = options.seeds;
+  result["iterations"] = options.train.schedule.iterations;
+  return result;
+}
+
+}  // namespace
+
+void AddBudget(CLI::App* app) {
+  const auto arguments = std::make_shared<Arguments>();
+  CLI::App* command =
+      AddSubcommand(app, "budget", "millimetres of error per physical effect: a table and a picture",
+                    [=](const CommonOptions& common) { return Run(*arguments, common); });
+  command->add_option("scene", arguments->scene, "scene file (see scenes/README.md)")
+      ->required()
+      ->check(CLI::ExistingFile);
+  command
+      ->add_option("-o,--output", arguments->folder,
+                   "folder for budget.csv, .svg and .png; what it holds already isn't measured again")
+      ->required();
+  command->add_option("--set", arguments->settings, "a key of the scene: path.to.key=value");
+  command->add_option("--scale", arguments->scale, "of the picture's width and height (default: 0.5)")
+      ->check(CLI::Range(1e-3, 8.0));
+  command->add_option("--effect", arguments->effects,
+                      "an effect to measure, by its name in the table; the others stay off (default: all)");
+  command->add_option("--seeds", arguments->seeds, "runs of every variant (default: 3)")
+      ->check(CLI::Range(1, 1000));
+  command->add_flag("--quick", arguments->quick, "short runs on small frames, one seed: some minutes");
+  AddTrainArguments(command, &arguments->train, "--train-set");
+}
+
+}  // namespace lumen
