@@ -57,6 +57,8 @@ class BudgetMeasurement {
         record_((CreateFolder(options.folder), options.folder / "measured.json"), options.subject) {
     // A run that is to know the gains needs them, whatever the scene keeps to itself.
     scene_.sensor.record_gain = true;
+    // Evaluation takes the mesh: no picture of the truth is looked at.
+    scene_.truth = {false, {}};
   }
 
   Budget Measure() {

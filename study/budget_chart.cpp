@@ -45,6 +45,10 @@ class BudgetChart {
     page_.shapes.push_back(DrawnText{at, text, size, kInk, align});
   }
 
+  void Box(const Vec2d& low, const Vec2d& high, const Rgb8& color) {
+    page_.shapes.emplace_back(std::in_place_type<DrawnBox>, low, high, color);
+  }
+
   static double Top(size_t row) { return kTitle + 26 + kRow * static_cast<double>(row); }
 
   void Names() {
@@ -84,7 +88,7 @@ class BudgetChart {
       Text({left + 6, y + kText / 3}, "no surface", kText - 2, TextAlign::kLeft);
       return;
     }
-    page_.shapes.push_back(DrawnBox{{left, y - kBar / 2}, {x(figure.mae_mm), y + kBar / 2}, kColors[model]});
+    Box({left, y - kBar / 2}, {x(figure.mae_mm), y + kBar / 2}, kColors[model]);
     const double low = x(std::max(0.0, figure.mae_mm - figure.spread_mm)),
                  high = x(figure.mae_mm + figure.spread_mm);
     page_.shapes.push_back(DrawnLine{{{low, y}, {high, y}}, kInk, 1.5, false});
@@ -100,7 +104,7 @@ class BudgetChart {
       const std::string name = "model of light: " + budget_.models[model];
       x -= TextWidth(name, kText) + 6;
       Text({x, 24}, name, kText, TextAlign::kLeft);
-      page_.shapes.push_back(DrawnBox{{x - 18, 14}, {x - 6, 25}, kColors[model]});
+      Box({x - 18, 14}, {x - 6, 25}, kColors[model]);
       x -= 40;
     }
   }
