@@ -1,6 +1,6 @@
 // The error budget: which variants there are, the table's arithmetic, and a measurement that is stopped and
 // goes on.
-#include "study/budget.h"
+#include "tools/study/budget.h"
 
 #include <gtest/gtest.h>
 
@@ -13,9 +13,9 @@
 #include "common/files.h"
 #include "common/progress.h"
 #include "sim/render.h"
-#include "study/budget_table.h"
-#include "study/run_record.h"
 #include "tests/support.h"
+#include "tools/study/budget_table.h"
+#include "tools/study/run_record.h"
 
 namespace lumen {
 namespace {

@@ -1,4 +1,4 @@
-#include "study/budget.h"
+#include "tools/study/budget.h"
 
 #include <fmt/core.h>
 
@@ -7,9 +7,9 @@
 #include "common/error.h"
 #include "common/files.h"
 #include "common/progress.h"
-#include "study/budget_table.h"
 #include "tools/options.h"
 #include "tools/scaled_scene.h"
+#include "tools/study/budget_table.h"
 #include "tools/train_arguments.h"
 
 namespace lumen {

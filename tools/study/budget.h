@@ -8,7 +8,7 @@
 
 #include "recon/training/options.h"
 #include "sim/scene.h"
-#include "study/budget_effects.h"
+#include "tools/study/budget_effects.h"
 
 namespace lumen {
 

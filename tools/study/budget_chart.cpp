@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "common/plot.h"
-#include "study/budget_table.h"
+#include "tools/study/budget_table.h"
 
 namespace lumen {
 namespace {

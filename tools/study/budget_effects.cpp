@@ -1,4 +1,4 @@
-#include "study/budget_effects.h"
+#include "tools/study/budget_effects.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "study/budget_table.h"
+#include "tools/study/budget_table.h"
 
 #include <fmt/format.h>
 

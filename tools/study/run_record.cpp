@@ -1,4 +1,4 @@
-#include "study/run_record.h"
+#include "tools/study/run_record.h"
 
 #include <cmath>
 #include <limits>

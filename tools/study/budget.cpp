@@ -1,4 +1,4 @@
-#include "study/budget.h"
+#include "tools/study/budget.h"
 
 #include <fmt/format.h>
 
@@ -14,7 +14,7 @@
 #include "recon/training/train.h"
 #include "sim/cost/knobs.h"
 #include "sim/render.h"
-#include "study/run_record.h"
+#include "tools/study/run_record.h"
 
 namespace lumen {
 namespace {

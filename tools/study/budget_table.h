@@ -5,7 +5,7 @@
 #include <string>
 
 #include "common/drawing.h"
-#include "study/budget.h"
+#include "tools/study/budget.h"
 
 namespace lumen {
 
