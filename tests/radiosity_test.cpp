@@ -14,22 +14,19 @@ namespace {
 
 using Map = DirectionMap<double>;
 
-// The part of all directions, evenly drawn, to which a cell's middle is the nearest but for the fold: counted
-// by the map itself, whose values count the cells.
+// Both the sum over cells and the mean over evenly drawn directions of a known function are its integral.
 TEST(DirectionMap, SolidAnglesAreThoseOfEvenlyDrawnDirections) {
   constexpr int kDraws = 400000;
-  // Of a piecewise linear map of 1 at one cell and 0 at others the mean over all directions is about the
-  // cell's share; the sum over two opposite eighths of the sphere is free of what leaks between cells.
   double sum = 0;
   for (int cell = 0; cell < Map::kCells; ++cell) sum += Map::SolidAngle(cell);
   EXPECT_NEAR(sum, 4 * kPi, 1e-12);
-  Map in_cone;
+  Map lobe;
   double share = 0;
   const Vec3d axis = Vec3d(1, 2, 3).normalized();
   for (int cell = 0; cell < Map::kCells; ++cell) {
     const double weight = std::pow(std::max(0.0, axis.dot(Map::Direction(cell))), 4);
     share += weight * Map::SolidAngle(cell);
-    in_cone.values[cell] = Vec3d::Constant(weight);
+    lobe.values[cell] = Vec3d::Constant(weight);
   }
   EXPECT_NEAR(share, 2 * kPi / 5, 0.01 * 2 * kPi / 5);  // ∫ cos⁴ over a hemisphere
   double mean = 0, largest_error = 0;
@@ -37,7 +34,7 @@ TEST(DirectionMap, SolidAnglesAreThoseOfEvenlyDrawnDirections) {
     const double z = 2 * UniformDouble(RandomBits(1, k, 0)) - 1;
     const double angle = 2 * kPi * UniformDouble(RandomBits(1, k, 1)), r = std::sqrt(1 - z * z);
     const Vec3d d(r * std::cos(angle), r * std::sin(angle), z);
-    const double value = in_cone.At(7 * d)[0];
+    const double value = lobe.At(7 * d)[0];
     mean += value / kDraws;
     if (z > -0.9)
       largest_error = std::max(largest_error, std::abs(value - std::pow(std::max(0.0, axis.dot(d)), 4)));
