@@ -106,7 +106,9 @@ TEST(Coat, WeakWhiteFurnaceIsOne) {
       EXPECT_LT(energy, 1) << alpha << ' ' << cosine;
       // At α = 1 the distribution is 1/π everywhere and Visibility 1/(2 (i·s + o·s)): single scattering sends
       // back ∫ i/(i + o) di.
-      if (alpha == 1) EXPECT_NEAR(energy, 1 - cosine * std::log(1 + 1 / cosine), 1e-4);
+      if (alpha == 1) {
+        EXPECT_NEAR(energy, 1 - cosine * std::log(1 + 1 / cosine), 1e-4);
+      }
     }
   }
 }
@@ -181,7 +183,9 @@ TEST(Coat, NeverCreatesEnergy) {
           }
           const double error = std::sqrt(std::max(0.0, squares - sum * sum) / count);
           EXPECT_LT(sum, 1 + 5 * error + 1e-3) << roughness << ' ' << tilt << ' ' << cosine << ' ' << turn;
-          if (tilt == 0) EXPECT_GT(sum, 1 - 5 * error - 2e-3) << roughness << ' ' << cosine;
+          if (tilt == 0) {
+            EXPECT_GT(sum, 1 - 5 * error - 2e-3) << roughness << ' ' << cosine;
+          }
         }
       }
     }

@@ -218,6 +218,11 @@ struct LookOfWall {
   Interreflection interreflection;
   bool as_paper = false;  // frequencies, softplus, a skip and the sphere that the network starts as
 };
+// Without it a test's name would hold the bytes of the struct's padding.
+void PrintTo(const LookOfWall& look, std::ostream* out) {
+  *out << "reflectance " << int(look.reflectance) << " interreflection " << int(look.interreflection)
+       << (look.as_paper ? " as the paper's" : "");
+}
 class RayLossGradient : public testing::TestWithParam<LookOfWall> {};
 
 TEST_P(RayLossGradient, MatchesFiniteDifferences) {
