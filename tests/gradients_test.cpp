@@ -212,6 +212,21 @@ TEST(Shading, DerivativesMatchFiniteDifferences) {
   }
 }
 
+FieldOptions SmallField(Reflectance reflectance, Interreflection interreflection) {
+  FieldOptions options;
+  options.reflectance = reflectance;
+  options.interreflection = interreflection;
+  options.ambient_hidden = {7};
+  options.grid.levels = 3;
+  options.grid.log2_table_size = 9;
+  options.initial.radius_mm = 8;
+  options.initial.reach_mm = 10;
+  options.sdf_hidden = {9, 8};
+  options.color_hidden = {10};
+  options.features = 5;
+  return options;
+}
+
 // The whole loss of a batch of rays in a lumen with two lights, by every kind of parameter.
 struct LookOfWall {
   Reflectance reflectance;
@@ -226,17 +241,7 @@ void PrintTo(const LookOfWall& look, std::ostream* out) {
 class RayLossGradient : public testing::TestWithParam<LookOfWall> {};
 
 TEST_P(RayLossGradient, MatchesFiniteDifferences) {
-  FieldOptions options;
-  options.reflectance = GetParam().reflectance;
-  options.interreflection = GetParam().interreflection;
-  options.ambient_hidden = {7};
-  options.grid.levels = 3;
-  options.grid.log2_table_size = 9;
-  options.initial.radius_mm = 8;
-  options.initial.reach_mm = 10;
-  options.sdf_hidden = {9, 8};
-  options.color_hidden = {10};
-  options.features = 5;
+  FieldOptions options = SmallField(GetParam().reflectance, GetParam().interreflection);
   if (GetParam().as_paper) {
     options.grid.levels = 0;
     options.place_octaves = 2;
@@ -360,16 +365,7 @@ void MoveFrame(const double motion[kPoseNumbers], const Light& light, RayBatch<d
 
 // Where the colours don't see the normal, nothing is left out of the gradient by a camera's motion.
 TEST(PoseGradient, MatchesFiniteDifferences) {
-  FieldOptions options;
-  options.reflectance = Reflectance::kUnlit;
-  options.interreflection = Interreflection::kNone;
-  options.grid.levels = 3;
-  options.grid.log2_table_size = 9;
-  options.initial.radius_mm = 8;
-  options.initial.reach_mm = 10;
-  options.sdf_hidden = {9, 8};
-  options.color_hidden = {10};
-  options.features = 5;
+  const FieldOptions options = SmallField(Reflectance::kUnlit, Interreflection::kNone);
   const InitialSurface initial(options.initial, {Pose::Identity()}, Vec3d::Zero());
   const Field<double> field(options, initial, kBox);
   std::vector<double> parameters(field.parameter_count());

@@ -1,6 +1,6 @@
 // A function of direction, as values on an octahedral grid (Engelhardt and Dachsbacher 2008, "Octahedron
-// environment maps"): the sphere's directions folded onto a square, cells of nearly one size. The middle of
-// the square is +z, its rim −z.
+// environment maps"): the sphere's directions folded onto a square. The middle of the square is +z, its rim
+// −z. Cells' solid angles differ by up to 3√3, largest in the middles of the octahedron's faces.
 #pragma once
 
 #include <algorithm>
@@ -21,8 +21,7 @@ class DirectionMap {
     return Unfold((T(cell % kEdge) + T(0.5)) / kEdge, (T(cell / kEdge) + T(0.5)) / kEdge);
   }
 
-  // Solid angle of a cell, sr, by the midpoint rule: within 2% of the true one, but for the cells at the
-  // square's diagonals, where the octahedron has its edges. They add up to 4π.
+  // Solid angle of a cell, sr, by the midpoint rule, scaled so that all add up to 4π.
   static T SolidAngle(int cell) { return Weights()[static_cast<size_t>(cell)]; }
 
   std::array<Vec3<T>, kCells> values;

@@ -25,7 +25,9 @@ Pose Moved(const Pose& world_from_camera, const PoseMotions& motions, int frame)
 void Move(const PoseMotions& motions, RayBatch<float>::Ray* ray);
 
 // A step against the gradient (kPoseNumbers a frame; cleared). What all frames' motions have in common is
-// taken out again, translations and rotations each: the surface would follow it, and no picture tells of it.
+// taken out again, translations and rotations each. A common translation no picture tells of, the surface
+// would follow it. A common turn of every camera about its own place is no such freedom, but on a nearly
+// straight path hardly anything holds it: it is supposed to be none.
 void UpdateMotions(const AdamStep& translation, const AdamStep& rotation, std::vector<float>* gradient,
                    PoseMotions* motions);
 

@@ -8,8 +8,8 @@
 namespace lumen {
 namespace {
 
-// At grazing incidence the patch of a direction is long; beyond a quarter of its length across its width, a
-// single place says little about it, and longer ones would outweigh all others.
+// A direction's patch is 1/cosine times as long as it is wide. Of one more than four times as long a single
+// place says little, and it would outweigh all others.
 constexpr double kShallowestCosine = 0.25;
 
 constexpr float kSharp = 1e3f;  // 1/mm: all surface samples lie within a hundredth of a mm of the surface

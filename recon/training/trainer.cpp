@@ -287,9 +287,9 @@ bool Trainer::has_surroundings() const {
 
 // The state's maps are what a run that is taken up again goes on with.
 void Trainer::UpdateSurroundings() {
-  const float* weights = Weights();
   const bool due = state_.iteration % kSurroundingsEvery == 0;
   if (!due && lights_.front().surroundings) return;
+  const float* weights = Weights();
   ParallelFor(0, static_cast<int64_t>(lights_.size()), [&](int64_t i) {
     float* stored = &state_.surroundings[static_cast<size_t>(i) * DirectionMap<float>::kCells * 3];
     auto& map = lights_[i].surroundings;
