@@ -2,8 +2,6 @@
 // on with is what an undisturbed run would have had.
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include "common/abandoned_files.h"
@@ -12,13 +10,16 @@
 #include "common/random.h"
 #include "recon/training/checkpoint.h"
 #include "recon/training/train.h"
+#include "tests/child_process.h"
 #include "tests/small_sequence.h"
 
 namespace lumen {
 namespace {
 
+using test::ExitCode;
 using test::ScratchFolder;
 using test::SmallSequence;
+using test::StartLumen;
 namespace fs = std::filesystem;
 
 // A checkpoint after every step, small; it holds the light that the wall sends itself, found at the first.
@@ -38,30 +39,11 @@ void TrainHere(const fs::path& folder, bool resume = false) {
 
 // The command as a child, its messages in `said`.
 pid_t Start(const fs::path& folder, bool resume, const fs::path& said, rlim_t largest_file = RLIM_INFINITY) {
-  std::vector<std::string> words = {"lumen", "train",         SmallSequence().folder.string(),
-                                    "-o",    folder.string(), "--quiet"};
+  std::vector<std::string> words = {"train", SmallSequence().folder.string(), "-o", folder.string(),
+                                    "--quiet"};
   for (const std::string& setting : kSettings) words.insert(words.end(), {"--set", setting});
   if (resume) words.push_back("--resume");
-  std::vector<char*> arguments;
-  for (std::string& word : words) arguments.push_back(word.data());
-  arguments.push_back(nullptr);
-  const std::string errors = said.string();
-  const pid_t child = fork();
-  if (child == 0) {
-    if (!freopen("/dev/null", "w", stdout) || !freopen(errors.c_str(), "w", stderr)) _exit(3);
-    const rlimit limit = {largest_file, largest_file};
-    signal(SIGXFSZ, SIG_IGN);  // a write then fails, as on a full disk
-    setrlimit(RLIMIT_FSIZE, &limit);
-    execv(LUMEN_COMMAND, arguments.data());
-    _exit(3);
-  }
-  return child;
-}
-
-int ExitCode(pid_t child) {
-  int status = 0;
-  waitpid(child, &status, 0);
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  return StartLumen(words, said, largest_file);
 }
 
 void ExpectOneLine(const fs::path& said) {

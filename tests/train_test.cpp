@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 #include <signal.h>
-#include <sys/wait.h>
 #include <unistd.h>
 
 #include "common/error.h"
@@ -12,13 +11,16 @@
 #include "common/progress.h"
 #include "recon/training/checkpoint.h"
 #include "recon/training/estimate.h"
+#include "tests/child_process.h"
 #include "tests/small_sequence.h"
 
 namespace lumen {
 namespace {
 
+using test::ExitCode;
 using test::ScratchFolder;
 using test::SmallSequence;
+using test::StartLumen;
 
 std::vector<std::string> SmallSettings(int iterations) {
   return {"schedule.iterations=" + std::to_string(iterations), "sampling.rays=96", "extract.cell_mm=3"};
@@ -45,30 +47,14 @@ TEST(Train, SameBytesForAnyNumberOfThreads) {
 
 // Starts the command; it writes a checkpoint after every step.
 pid_t StartTraining(const std::filesystem::path& folder, bool resume) {
-  const std::string sequence = SmallSequence().folder.string(), out = folder.string();
-  const pid_t child = fork();
-  if (child == 0) {
-    std::vector<const char*> arguments = {"lumen",          "train",
-                                          sequence.c_str(), "-o",
-                                          out.c_str(),      "--quiet",
-                                          "--iterations",   "120",
-                                          "--set",          "sampling.rays=96",
-                                          "--set",          "extract.cell_mm=3",
-                                          "--set",          "grid.log2_table_size=10",
-                                          "--set",          "schedule.checkpoint_seconds=0"};
-    if (resume) arguments.push_back("--resume");
-    arguments.push_back(nullptr);
-    if (!freopen("/dev/null", "w", stdout)) _exit(3);
-    execv(LUMEN_COMMAND, const_cast<char* const*>(arguments.data()));
-    _exit(3);
+  std::vector<std::string> words = {
+      "train", SmallSequence().folder.string(), "-o", folder.string(), "--quiet", "--iterations", "120"};
+  for (const char* setting : {"sampling.rays=96", "extract.cell_mm=3", "grid.log2_table_size=10",
+                              "schedule.checkpoint_seconds=0"}) {
+    words.insert(words.end(), {"--set", setting});
   }
-  return child;
-}
-
-int ExitCode(pid_t child) {
-  int status = 0;
-  waitpid(child, &status, 0);
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  if (resume) words.push_back("--resume");
+  return StartLumen(words);
 }
 
 TEST(Train, KilledAndResumedEqualsUninterrupted) {
