@@ -61,26 +61,54 @@ Pose ToPose(const LineReader& reader, const Row& row, bool transposed) {
 
 }  // namespace
 
-std::vector<Pose> ReadPoses(const std::filesystem::path& file) {
+std::vector<PoseLine> ReadPoseLines(const std::filesystem::path& file) {
   const std::string text = ReadFile(file);
   LineReader reader(file, text);
-  std::vector<Pose> poses;
+  struct Parsed {
+    std::optional<Row> row;
+    LineReader place;
+  };
+  std::vector<Parsed> parsed;
+  std::vector<PoseLine> lines;
   std::optional<bool> transposed;  // known from the first pose that isn't both
-  std::vector<std::pair<Row, LineReader>> rows;
   while (reader.NextFilledLine()) {
-    const Row row = ParseRow(&reader);
-    if (row[15] != 1) reader.Fail("a pose's last number must be 1");
-    const bool fits_today = AllZero(row, 3, 7, 11), fits_first = AllZero(row, 12, 13, 14);
-    if (!fits_today && !fits_first) reader.Fail("a pose with both numbers 3, 7, 11 and 12–14 other than 0");
-    if (fits_today != fits_first) {
-      if (transposed.value_or(fits_today) != fits_today) {
-        reader.Fail("a pose is laid out otherwise (transposed) than those before");
+    parsed.push_back({std::nullopt, reader});
+    PoseLine& line = lines.emplace_back();
+    try {
+      const Row row = ParseRow(&reader);
+      if (row[15] != 1) reader.Fail("a pose's last number must be 1");
+      const bool fits_today = AllZero(row, 3, 7, 11), fits_first = AllZero(row, 12, 13, 14);
+      if (!fits_today && !fits_first) {
+        reader.Fail("a pose with both numbers 3, 7, 11 and 12–14 other than 0");
       }
-      transposed = fits_today;
+      if (fits_today != fits_first) {
+        if (transposed.value_or(fits_today) != fits_today) {
+          reader.Fail("a pose is laid out otherwise (transposed) than those before");
+        }
+        transposed = fits_today;
+      }
+      parsed.back().row = row;
+    } catch (const InputError& error) {
+      line.problem = error.what();
     }
-    rows.emplace_back(row, reader);
   }
-  for (const auto& [row, place] : rows) poses.push_back(ToPose(place, row, transposed.value_or(true)));
+  for (size_t i = 0; i < lines.size(); ++i) {
+    if (!parsed[i].row) continue;
+    try {
+      lines[i].pose = ToPose(parsed[i].place, *parsed[i].row, transposed.value_or(true));
+    } catch (const InputError& error) {
+      lines[i].problem = error.what();
+    }
+  }
+  return lines;
+}
+
+std::vector<Pose> ReadPoses(const std::filesystem::path& file) {
+  std::vector<Pose> poses;
+  for (const PoseLine& line : ReadPoseLines(file)) {
+    if (!line.pose) throw InputError(line.problem);
+    poses.push_back(*line.pose);
+  }
   return poses;
 }
 

@@ -4,13 +4,13 @@
 #include <cstdio>
 #include <stdexcept>
 
+#include "common/c3vd_camera.h"
 #include "common/calibration.h"
 #include "common/config.h"
 #include "common/error.h"
 #include "common/files.h"
 #include "common/frame_files.h"
-#include "common/line_reader.h"
-#include "common/parallel.h"
+#include "common/frame_lines.h"
 #include "common/pose_file.h"
 
 namespace lumen {
@@ -22,9 +22,8 @@ constexpr char kTomlName[] = "sequence.toml";
 constexpr char kCalibrationName[] = "calibration.toml";
 constexpr char kPosesName[] = "pose.txt";
 constexpr char kMaskName[] = "mask.png";
+constexpr char kIntrinsicsName[] = "camera_intrinsics.txt";  // C3VDv2's
 constexpr char kCoverageMeshName[] = "coverage_mesh.obj";
-// Mask values from here on are image.
-constexpr uint8_t kMaskThreshold = 128;
 
 bool IsFile(const fs::path& path) {
   std::error_code ignored;
@@ -92,6 +91,21 @@ void ReadCalibrationOnTop(Sequence* sequence, Gains* gains) {
   config.RejectUnknown();
 }
 
+// A C3VD folder's: C3VDv2's layout has C3VDv2's camera, and the file that comes with the data set has the
+// last word.
+Calibration CalibrationOfDownload(const fs::path& folder) {
+  Calibration calibration = C3vdCalibration();
+  std::error_code ignored;
+  if (fs::is_directory(folder / "rgb", ignored)) calibration.camera = C3vdV2Intrinsics();
+  for (const fs::path& place : {folder / kIntrinsicsName, folder / ".." / kIntrinsicsName}) {
+    if (!IsFile(place)) continue;
+    calibration.camera = ReadC3vdIntrinsics(place);
+    calibration.mask = C3vdOctagon(calibration.camera.width, calibration.camera.height);
+    break;
+  }
+  return calibration;
+}
+
 std::vector<SequenceFrame> FramesWithColor(const fs::path& folder) {
   std::vector<SequenceFrame> frames;
   for (const auto& [number, files] : FindFrameFiles(folder)) {
@@ -113,46 +127,87 @@ std::vector<SequenceFrame> FramesWithColor(const fs::path& folder) {
 
 // The colour file that a sequence with more poses than frames lacks: at the first gap of the numbers, or at
 // the end.
-int FirstMissing(const std::vector<SequenceFrame>& frames) {
-  for (size_t i = 1; i < frames.size(); ++i) {
-    if (frames[i].number != frames[i - 1].number + 1) return frames[i - 1].number + 1;
+int FirstMissing(const std::vector<int>& numbers) {
+  for (size_t i = 1; i < numbers.size(); ++i) {
+    if (numbers[i] != numbers[i - 1] + 1) return numbers[i - 1] + 1;
   }
-  return frames.back().number + 1;
+  return numbers.back() + 1;
 }
 
-// A pose file has a line for every frame that is here, in order; or, in C3VD folders, for every frame that
-// was ever recorded (a part of a download, sigmoid_t1_a): then the number of the frame is that of its line.
-void AssignPoses(Sequence* sequence) {
-  const fs::path file = sequence->folder / kPosesName;
-  const std::vector<Pose> poses = ReadPoses(file);
-  std::vector<SequenceFrame>& frames = sequence->frames;
-  const std::string counts =
-      ": " + std::to_string(poses.size()) + " poses, but " + std::to_string(frames.size()) + " colour files";
-  const bool in_order = poses.size() == frames.size();
-  if (poses.size() < frames.size()) {
-    throw InputError(file.string() + counts + "; add the missing lines or remove the frames from " +
-                     frames[poses.size()].color.filename().string() + " on");
+// The numbers below `count` that aren't among these.
+std::vector<int> Absent(const std::vector<int>& numbers, size_t count) {
+  std::vector<int> absent;
+  for (int number = 0; number < static_cast<int>(count); ++number) {
+    if (!std::ranges::binary_search(numbers, number)) absent.push_back(number);
   }
-  if (!in_order && sequence->has_toml) {
-    throw InputError(file.string() + counts + "; there is no " +
-                     FrameFile("", FirstMissing(frames), "color.png").string());
-  }
-  for (size_t i = 0; i < frames.size(); ++i) {
-    const size_t line = in_order ? i : static_cast<size_t>(frames[i].number);
-    if (line >= poses.size()) {
-      throw InputError(file.string() + counts + "; " + frames[i].color.filename().string() + " has no line");
-    }
-    frames[i].world_from_camera = poses[line];
-  }
+  return absent;
 }
 
-void AssignGains(const Gains& gains, std::vector<SequenceFrame>* frames) {
+// Gains are in the order of the frames that are here, or of those that the pose file knows.
+void AssignGains(const Gains& gains, const std::vector<std::optional<size_t>>& line, size_t lines,
+                 std::vector<SequenceFrame>* frames) {
   if (!gains.table) return;
-  if (gains.values.size() != frames->size()) {
+  const bool by_frame = gains.values.size() == frames->size();
+  if (!by_frame && gains.values.size() != lines) {
     gains.table->Fail("gain", "has " + std::to_string(gains.values.size()) + " elements, but there are " +
                                   std::to_string(frames->size()) + " frames");
   }
-  for (size_t i = 0; i < frames->size(); ++i) (*frames)[i].gain = gains.values[i];
+  for (size_t i = 0; i < frames->size(); ++i) {
+    if (by_frame || line[i]) (*frames)[i].gain = gains.values[by_frame ? i : *line[i]];
+  }
+}
+
+// Poses and gains. Frames without a pose are errors or, on request, left out; so are, in folders of our own,
+// poses without a frame. C3VD's may be a part of a download.
+void AssignPosesAndGains(const Gains& gains, const ReadOptions& options, Sequence* sequence) {
+  const fs::path file = sequence->folder / kPosesName;
+  const std::vector<PoseLine> poses = ReadPoseLines(file);
+  for (const PoseLine& line : poses) {
+    if (!line.pose && !options.skip_damaged) throw DamagedFrame(line.problem);
+  }
+  std::vector<SequenceFrame>& frames = sequence->frames;
+  std::vector<int> numbers;
+  for (const SequenceFrame& frame : frames) numbers.push_back(frame.number);
+  const std::string counts = file.string() + ": " + std::to_string(poses.size()) + " poses, but " +
+                             std::to_string(frames.size()) + " colour files";
+  const auto lines = LinesOfFrames(numbers, poses.size());
+  if (poses.size() < frames.size() && (!lines || !options.skip_damaged)) {
+    const std::string problem = counts + "; add the missing lines or remove the frames from " +
+                                frames[poses.size()].color.filename().string() + " on";
+    if (lines) throw DamagedFrame(problem);
+    throw InputError(problem);  // whose lines are missing can't be told
+  }
+  if (poses.size() > frames.size() && sequence->has_toml && !(lines && options.skip_damaged)) {
+    const std::string problem =
+        counts + "; there is no " + FrameFile("", FirstMissing(numbers), "color.png").string();
+    if (lines) throw DamagedFrame(problem);
+    throw InputError(problem);
+  }
+  if (!lines) throw InputError(counts + "; " + frames.back().color.filename().string() + " has no line");
+  if (poses.size() > frames.size()) {
+    sequence->left_out.push_back(counts + "; there is none of frame " +
+                                 Ranges(Absent(numbers, poses.size())));
+  }
+  AssignGains(gains, *lines, poses.size(), &frames);
+  std::vector<SequenceFrame> usable;
+  std::vector<int> without_line;
+  for (size_t i = 0; i < frames.size(); ++i) {
+    const auto line = (*lines)[i];
+    if (!line) {
+      without_line.push_back(frames[i].number);
+    } else if (poses[*line].pose) {
+      usable.push_back(frames[i]);
+      usable.back().world_from_camera = *poses[*line].pose;
+    } else {
+      sequence->left_out.push_back(poses[*line].problem + "; frame " + std::to_string(frames[i].number) +
+                                   " is left out");
+    }
+  }
+  if (!without_line.empty()) {
+    sequence->left_out.push_back(counts + "; frame " + Ranges(without_line) + " is left out");
+  }
+  if (usable.empty()) throw InputError(file.string() + ": no frame has a pose");
+  frames = usable;
 }
 
 // A TOML string in quotes.
@@ -202,7 +257,7 @@ Calibration C3vdCalibration() {
   return calibration;
 }
 
-Sequence ReadSequence(const fs::path& folder) {
+Sequence ReadSequence(const fs::path& folder, const ReadOptions& options) {
   std::error_code ignored;
   if (!fs::is_directory(folder, ignored)) throw InputError(folder.string() + ": no such sequence folder");
   Sequence sequence;
@@ -212,15 +267,14 @@ Sequence ReadSequence(const fs::path& folder) {
   if (sequence.has_toml) {
     ReadToml(&sequence, &gains);
   } else {
-    sequence.calibration = C3vdCalibration();
+    sequence.calibration = CalibrationOfDownload(folder);
     if (IsFile(folder / kMaskName)) {
       sequence.calibration.mask = ReadMask(folder / kMaskName, sequence.calibration.camera);
     }
   }
   ReadCalibrationOnTop(&sequence, &gains);
   sequence.frames = FramesWithColor(folder);
-  AssignPoses(&sequence);
-  AssignGains(gains, &sequence.frames);
+  AssignPosesAndGains(gains, options, &sequence);
   if (sequence.ground_truth_mesh.empty() && IsFile(folder / kCoverageMeshName)) {
     sequence.ground_truth_mesh = folder / kCoverageMeshName;
   }
@@ -257,30 +311,6 @@ fs::path FrameFile(const fs::path& folder, int number, const std::string& suffix
   std::string name = digits;
   name.append("_").append(suffix);
   return folder / name;
-}
-
-Image8 ReadColor(const Sequence& sequence, const SequenceFrame& frame) {
-  Image8 color = ReadImage8(frame.color, 3);
-  const CameraIntrinsics& camera = sequence.calibration.camera;
-  if (color.width != camera.width || color.height != camera.height) {
-    throw InputError(frame.color.string() + ": has " + std::to_string(color.width) + "×" +
-                     std::to_string(color.height) + " pixels, the camera " + std::to_string(camera.width) +
-                     "×" + std::to_string(camera.height));
-  }
-  return color;
-}
-
-Image8 ValidPixels(const Calibration& calibration) {
-  const Camera<double> camera(calibration.camera);
-  Image8 valid(calibration.camera.width, calibration.camera.height, 1);
-  ParallelFor(0, valid.height, [&](int64_t row) {
-    const int y = static_cast<int>(row);
-    for (int x = 0; x < valid.width; ++x) {
-      const bool masked_out = !calibration.mask.empty() && *calibration.mask.Pixel(x, y) < kMaskThreshold;
-      if (!masked_out && camera.Unproject(Vec2d(x, y))) *valid.Pixel(x, y) = 255;
-    }
-  });
-  return valid;
 }
 
 }  // namespace lumen

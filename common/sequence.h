@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "common/camera.h"
+#include "common/error.h"
 #include "common/image.h"
 #include "common/light.h"
 #include "common/math.h"
@@ -23,7 +24,8 @@ struct Calibration {
   Response response;
 };
 
-// C3VD's built-in calibration, for folders without a sequence.toml.
+// C3VD's built-in calibration, for folders without a sequence.toml; C3VDv2's differs in the camera only
+// (common/c3vd_camera.h).
 Calibration C3vdCalibration();
 
 // The octagon that C3VD's scope shows, in parts of the image: its corners are cut off along the lines
@@ -45,14 +47,33 @@ struct Sequence {
   Calibration calibration;
   std::vector<SequenceFrame> frames;
   std::filesystem::path ground_truth_mesh;  // empty = none
+  std::vector<std::string> left_out;        // what of the folder is not used, and why: a line each
+};
+
+// A frame that can't be used although the sequence can: ReadOptions can leave it out.
+class DamagedFrame : public InputError {
+ public:
+  using InputError::InputError;
+};
+
+struct ReadOptions {
+  // Frames whose pose is missing or damaged, and those that are missing themselves, are left out and named in
+  // left_out; otherwise they are errors.
+  bool skip_damaged = false;
 };
 
 // Reads sequence.toml (or falls back to C3VD's calibration), calibration.toml on top where there is one
 // ([light], [response] and [frames] gain, each in place of the sequence's own), pose.txt, and finds the
-// frames' files, in the layout of C3VD v1 or v2. Pixels are not read. Throws InputError naming file and
-// place: unknown or missing keys, a pose line short of numbers or no rotation (not orthonormal within 1e-3),
-// fewer poses or gains than colour files, no frame at all, a mask of another size.
-Sequence ReadSequence(const std::filesystem::path& folder);
+// frames' files, in the layout of C3VD v1 or v2. Pixels are not read. A C3VD folder may be a part of a
+// download: where it has more poses than colour files, a frame's number is that of its line. Throws
+// InputError naming file and place: unknown or missing keys, no frame at all, a mask of another size, gains
+// that don't fit the frames; DamagedFrame: a pose line short of numbers or no rotation (not orthonormal
+// within 1e-3), fewer poses than colour files, or more in a folder with sequence.toml.
+Sequence ReadSequence(const std::filesystem::path& folder, const ReadOptions& options = {});
+
+// Reads the colour file of every frame and leaves out, naming them in left_out, those that are damaged or of
+// another size than the camera's. Throws InputError where none is left.
+void LeaveOutUnreadableFrames(Sequence* sequence);
 
 // Writes sequence.toml, mask.png and pose.txt; frames' files are the caller's. Paths of the ground truth are
 // written relative to the folder.
@@ -62,7 +83,7 @@ void WriteSequenceHeader(const Sequence& sequence);
 // folder/0012_color.png.
 std::filesystem::path FrameFile(const std::filesystem::path& folder, int number, const std::string& suffix);
 
-// Colour of a frame, 8-bit RGB, checked against the camera's size.
+// Colour of a frame, 8-bit RGB, checked against the camera's size. Throws DamagedFrame.
 Image8 ReadColor(const Sequence& sequence, const SequenceFrame& frame);
 
 // Pixels that carry image: inside the mask and with a ray. One channel, 255 = yes.

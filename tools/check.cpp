@@ -23,13 +23,27 @@ Subject SubjectOf(const fs::path& path) {
                                                                          : Subject::kScene;
 }
 
+// Damaged frames are errors and left out; frames that a download lacks are odd.
+Sequence ReadWhatCanBe(const fs::path& folder, Findings* findings) {
+  try {
+    const Sequence sequence = ReadSequence(folder);
+    for (const std::string& line : sequence.left_out) findings->Warn(line);
+    return sequence;
+  } catch (const DamagedFrame&) {
+    const Sequence sequence = ReadSequence(folder, {.skip_damaged = true});
+    for (const std::string& line : sequence.left_out) findings->Error(line);
+    return sequence;
+  }
+}
+
 // What can't be read at all is a finding as well.
 nlohmann::json Check(const fs::path& path, uint64_t seed, Findings* findings) {
   try {
     switch (SubjectOf(path)) {
       case Subject::kSequence: {
         const fs::path folder = fs::is_directory(path) ? path : path.parent_path();
-        return {{"sequence", CheckSequence(ReadSequence(folder.empty() ? "." : folder), findings)}};
+        return {
+            {"sequence", CheckSequence(ReadWhatCanBe(folder.empty() ? "." : folder, findings), findings)}};
       }
       case Subject::kMesh:
         return {{"mesh", CheckMesh(path.string(), ReadMesh(path), findings)}};

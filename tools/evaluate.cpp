@@ -8,12 +8,14 @@
 #include "recon/evaluation/evaluation_table.h"
 #include "recon/evaluation/sheet.h"
 #include "tools/options.h"
+#include "tools/sequence_arguments.h"
 
 namespace lumen {
 namespace {
 
 struct Arguments {
-  std::filesystem::path mesh, sequence, folder;
+  std::filesystem::path mesh, folder;
+  SequenceArguments sequence;
 };
 
 nlohmann::json Run(const Arguments& arguments, const CommonOptions& common) {
@@ -38,11 +40,12 @@ nlohmann::json Run(const Arguments& arguments, const CommonOptions& common) {
 
 void AddEvaluate(CLI::App* app) {
   const auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = AddSubcommand(app, "evaluate", "measures a reconstruction against the truth",
-                                    [=](const CommonOptions& common) { return Run(*arguments, common); });
+  CLI::App* command = AddSubcommand(
+      app, "evaluate", "measures a reconstruction against the truth",
+      [=](const CommonOptions& common) { return OfferingToSkip([&] { return Run(*arguments, common); }); });
   command->add_option("MESH", arguments->mesh, "the reconstruction (PLY, OBJ, OFF, STL; mm, world axes)")
       ->required();
-  command->add_option("SEQ", arguments->sequence, "the sequence folder with its ground truth")->required();
+  AddSequenceArguments(command, &arguments->sequence, "SEQ");
   command->add_option("-o,--output", arguments->folder, "folder for the coloured meshes and pictures");
 }
 

@@ -2,9 +2,9 @@
 
 #include <iostream>
 
-#include "common/sequence.h"
 #include "recon/training/estimate.h"
 #include "tools/options.h"
+#include "tools/sequence_arguments.h"
 #include "tools/train_arguments.h"
 
 namespace lumen {
@@ -49,26 +49,29 @@ nlohmann::json Estimate(const Sequence& sequence, const TrainOptions& options, u
 
 void AddTrain(CLI::App* app) {
   struct Arguments {
-    std::filesystem::path sequence, run;
+    SequenceArguments sequence;
+    std::filesystem::path run;
     TrainArguments train;
     bool resume = false, dry_run = false;
   };
   auto arguments = std::make_shared<Arguments>();
-  auto* command =
-      AddSubcommand(app, "train", "reconstructs a sequence", [arguments](const CommonOptions& common) {
-        const TrainOptions options = ReadTrainOptions(arguments->train.preset, arguments->train.Settings());
-        if (arguments->dry_run) return Estimate(ReadSequence(arguments->sequence), options, common.seed);
-        if (arguments->run.empty()) throw CLI::RequiredError("-o (or --dry-run)");
-        TrainRun run;
-        run.folder = arguments->run;
-        run.seed = common.seed;
-        run.resume = arguments->resume;
-        const TrainResult result = Train(ReadSequence(arguments->sequence), options, run);
-        std::cout << "trained " << result.iterations << " iterations in " << result.seconds
-                  << " s; the mesh is " << (run.folder / "mesh.ply").string() << "\n";
-        return ToJson(result);
-      });
-  command->add_option("sequence", arguments->sequence, "sequence folder")->required();
+  const auto run_command = [arguments](const CommonOptions& common) -> nlohmann::json {
+    const TrainOptions options = ReadTrainOptions(arguments->train.preset, arguments->train.Settings());
+    if (arguments->dry_run) return Estimate(ReadSequence(arguments->sequence), options, common.seed);
+    if (arguments->run.empty()) throw CLI::RequiredError("-o (or --dry-run)");
+    TrainRun run;
+    run.folder = arguments->run;
+    run.seed = common.seed;
+    run.resume = arguments->resume;
+    const TrainResult result = Train(ReadSequence(arguments->sequence), options, run);
+    std::cout << "trained " << result.iterations << " iterations in " << result.seconds << " s; the mesh is "
+              << (run.folder / "mesh.ply").string() << "\n";
+    return ToJson(result);
+  };
+  auto* command = AddSubcommand(app, "train", "reconstructs a sequence", [=](const CommonOptions& common) {
+    return OfferingToSkip([&] { return run_command(common); });
+  });
+  AddSequenceArguments(command, &arguments->sequence, "sequence");
   command->add_option("-o", arguments->run, "folder of the run; a dry run needs none");
   AddTrainArguments(command, &arguments->train);
   command->add_flag("--resume", arguments->resume, "go on from the folder's checkpoint");
