@@ -21,6 +21,8 @@ int main(int argc, char** argv) {
   lumen::AddTrain(&app);
   lumen::AddEvaluate(&app);
   lumen::AddLoop(&app);
+  lumen::AddExport(&app);
+  lumen::AddImport(&app);
   lumen::AddCheck(&app);
   lumen::AddPhotometry(&app);
   lumen::AddCost(&app);

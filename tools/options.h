@@ -25,6 +25,8 @@ CLI::App* AddSubcommand(CLI::App* app, const std::string& name, const std::strin
 void AddRender(CLI::App* app);
 void AddTrain(CLI::App* app);
 void AddEvaluate(CLI::App* app);
+void AddExport(CLI::App* app);
+void AddImport(CLI::App* app);
 void AddLoop(CLI::App* app);
 void AddCheck(CLI::App* app);
 void AddPhotometry(CLI::App* app);

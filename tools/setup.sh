@@ -2,11 +2,13 @@
 # Installs the Debian 12 packages that lumen is built from. Does nothing when all are there.
 set -euo pipefail
 
-# openimageio-tools: Debian's CMake file of OpenImageIO refuses to load without its programs.
+# openimageio-tools: Debian's CMake file of OpenImageIO refuses to load without its programs. python3: reads in
+# the tests what is exported for other programs.
 packages=(
   g++ cmake ninja-build
   libembree-dev libopenimageio-dev openimageio-tools libeigen3-dev libcgal-dev libopenmesh-dev libtbb-dev
   libfmt-dev libtomlplusplus-dev libcli11-dev nlohmann-json3-dev libgtest-dev libbenchmark-dev fonts-dejavu-core
+  python3
 )
 
 missing=()
