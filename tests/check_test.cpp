@@ -183,6 +183,16 @@ TEST_F(CheckSequence, WhatReadingFindsIsFound) {
   ExpectError(scratch_.path(), "pose.txt: 1 poses, but 2 colour files");
 }
 
+// Every damaged frame is named, and the others are looked at all the same.
+TEST_F(CheckSequence, DamagedPosesAreNamedAndTheRestIsChecked) {
+  std::string poses = ReadFile(scratch_ / "pose.txt");
+  WriteFile(scratch_ / "pose.txt", "1,0,0\n" + poses.substr(poses.find('\n') + 1));
+  WriteImage(File(1, "occlusion.png"), Image8(kWidth, kHeight, 1, 1));
+  ExpectError(scratch_.path(),
+              "pose.txt:1: a pose is 16 numbers, camera to world, but here are 3; frame 0 is left out");
+  ExpectError(scratch_.path(), "frame 1: 81920 occlusion values are neither 0 nor 255");
+}
+
 TEST_F(CheckSequence, DamagedFilesAreNamed) {
   const std::string png = ReadFile(File(1, "color.png"));
   WriteFile(File(1, "color.png"), png.substr(0, png.size() / 2));

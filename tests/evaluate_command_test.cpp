@@ -56,7 +56,7 @@ TEST_F(EvaluateCommand, WritesTheTableTheJsonAndThePictures) {
   EXPECT_EQ(json, ToJson(Evaluate(reconstruction_, sequence_)));
   EXPECT_EQ(json, nlohmann::json::parse(ReadFile(scratch_ / "result" / "evaluation.json")));
   EXPECT_NEAR(json["surveyed"]["mae_mm"], 1, 1e-9);
-  for (const std::string name : {"error.png", "views.png", "sheet.png"}) {
+  for (const std::string name : {"error.png", "views.png", "sheet.png", "walk.png"}) {
     EXPECT_GT(ReadImage8(scratch_ / "result" / name, 3).width, 600) << name;
   }
   // 1 mm inside everywhere; of the truth's corners and middles only some are seen.
@@ -66,6 +66,8 @@ TEST_F(EvaluateCommand, WritesTheTableTheJsonAndThePictures) {
   EXPECT_EQ(views.size(), test::Cube(20, 6).vertices.size());
   EXPECT_GT(std::count(views.begin(), views.end(), kUnobservedGrey), 50);
   EXPECT_GT(std::count(views.begin(), views.end(), Jet(1)), 10);
+  EXPECT_EQ(ReadMesh(scratch_ / "result" / "unseen.ply").vertices.size(), reconstruction_.vertices.size());
+  EXPECT_NE(ReadFile(scratch_ / "out").find("by the reconstruction alone"), std::string::npos);
   EXPECT_NE(ReadFile(scratch_ / "out").find("surveyed         1.000    1.000    1.000"), std::string::npos);
 }
 

@@ -7,6 +7,7 @@
 #include "common/parallel.h"
 #include "common/progress.h"
 #include "common/ray_scene.h"
+#include "recon/evaluation/coverage.h"
 #include "recon/evaluation/nearest_point.h"
 #include "recon/evaluation/point_mesh_distance.h"
 #include "recon/evaluation/surface_points.h"
@@ -109,8 +110,9 @@ void MeasureCompleteness(const Mesh& reconstruction, const Mesh& truth, const Fr
   for (size_t i = 0; i < points.size(); ++i) {
     if (frames_seeing[i] > 0) observed.push_back(points[i].position);
   }
-  result->coverage.observed_fraction =
-      static_cast<double>(observed.size()) / static_cast<double>(points.size());
+  const SurveyedShare share = MeasureShare(points, frames_seeing, options.extended_mm);
+  result->coverage.observed_fraction = share.whole;
+  result->coverage.truth_share = share.near;
 
   const PointMeshDistance to_reconstruction(reconstruction);
   std::vector<double> distances_mm(observed.size());
@@ -153,7 +155,8 @@ Evaluation Evaluate(const Mesh& reconstruction, const Mesh& truth, const Sequenc
   Evaluation result;
 
   progress.Update(0, "what the frames see");
-  Visibility seen = SeeVertices(RayScene(reconstruction), views);
+  const RayScene scene(reconstruction);
+  Visibility seen = SeeVertices(scene, views);
   std::vector<bool> surveyed(used.size());
   for (size_t v = 0; v < used.size(); ++v) {
     if (!used[v]) seen.frames_seeing[v] = 0;
@@ -164,7 +167,11 @@ Evaluation Evaluate(const Mesh& reconstruction, const Mesh& truth, const Sequenc
   result.best_frame = static_cast<int>(std::max_element(seen.places_seen.begin(), seen.places_seen.end()) -
                                        seen.places_seen.begin());
 
-  progress.Update(0.3, "distances to the truth");
+  const auto points = SpreadPoints(reconstruction, options.completeness_points, options.seed);
+  result.coverage.reconstruction_share =
+      MeasureShare(points, SeePoints(scene, points, views).frames_seeing, options.extended_mm).near;
+
+  progress.Update(0.4, "distances to the truth");
   result.signed_error_mm = SignedErrors(reconstruction, used, PointMeshDistance(truth), views);
   result.surveyed = ErrorOver(result.signed_error_mm, surveyed);
   result.extended = ErrorOver(result.signed_error_mm, extended);

@@ -13,7 +13,8 @@ namespace lumen {
 
 struct EvaluateOptions {
   double extended_mm = 20;            // how far from a seen vertex the extended region reaches
-  int completeness_points = 100'000;  // spread over the whole ground truth; those that are seen count
+  int completeness_points = 100'000;  // spread over the whole ground truth; those that are seen count. As
+                                      // many over the reconstruction, for what share of it is seen
   uint64_t seed = 0;                  // of the points
 };
 
@@ -43,6 +44,18 @@ struct Coverage {
   double surveyed_area_mm2 = 0;  // of the reconstruction's faces all of whose vertices are surveyed
   double extended_area_mm2 = 0;
   double observed_fraction = 0;  // of the ground truth's area
+
+  // The share of mucosa that was surveyed: of a surface's area within extended_mm of what the frames see of
+  // it, the part that they see. From the truth, and, by the same rule, from the reconstruction alone, as
+  // where there is no truth; farther off the reconstruction claims nothing. Nothing where no frame sees
+  // anything.
+  std::optional<double> truth_share;
+  std::optional<double> reconstruction_share;
+  // By how many percentage points the reconstruction's is larger.
+  std::optional<double> DifferencePoints() const {
+    if (!truth_share || !reconstruction_share) return std::nullopt;
+    return 100 * (*reconstruction_share - *truth_share);
+  }
 };
 
 struct Evaluation {

@@ -35,7 +35,10 @@ nlohmann::json ToJson(const Evaluation& evaluation) {
           {"coverage",
            {{"surveyed_area_mm2", evaluation.coverage.surveyed_area_mm2},
             {"extended_area_mm2", evaluation.coverage.extended_area_mm2},
-            {"observed_fraction", evaluation.coverage.observed_fraction}}},
+            {"observed_fraction", evaluation.coverage.observed_fraction},
+            {"truth_share", OrNull(evaluation.coverage.truth_share)},
+            {"reconstruction_share", OrNull(evaluation.coverage.reconstruction_share)},
+            {"difference_percentage_points", OrNull(evaluation.coverage.DifferencePoints())}}},
           {"mesh", mesh}};
 }
 

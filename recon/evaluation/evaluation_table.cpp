@@ -29,6 +29,13 @@ std::string ToTable(const Evaluation& evaluation) {
   table += "completeness " + Figures(completeness.error) + "   within 1 mm " +
            Percent(completeness.within_1mm) + ", within 3 mm " + Percent(completeness.within_3mm) + "\n";
   table += "observed     " + Percent(evaluation.coverage.observed_fraction) + " of the truth's area\n";
+  const Coverage& coverage = evaluation.coverage;
+  table += "coverage     " + Percent(coverage.reconstruction_share) + " by the reconstruction alone, " +
+           Percent(coverage.truth_share) + " by the truth";
+  if (const auto difference = coverage.DifferencePoints()) {
+    table += fmt::format(": {:+.1f} percentage points", *difference);
+  }
+  table += "\n";
   table += fmt::format("mesh         {}, {} component{}, {} faces",
                        mesh.watertight ? "watertight" : "not watertight", mesh.components,
                        mesh.components == 1 ? "" : "s", mesh.faces);

@@ -52,7 +52,9 @@ Image8 Portrait::Draw(const View& view, const std::vector<Rgb8>& colors) const {
     }
     const Vec3f ray(rays.direction[0][lane], rays.direction[1][lane], rays.direction[2][lane]);
     // normalized() leaves the zero vector as it is, which opposite normals add up to: the darkest shade.
-    return color * (0.3f + 0.7f * std::min(std::abs(normal.normalized().dot(ray)), 1.0f));
+    const float lit = 0.3f + 0.7f * std::min(std::abs(normal.normalized().dot(ray)), 1.0f);
+    const float far = view.fade_mm > 0 ? hits.t[lane] / static_cast<float>(view.fade_mm) : 0;
+    return color * (lit / (1 + far * far));
   };
   ParallelFor(0, image.height, [&](int64_t row) {
     const int y = static_cast<int>(row);

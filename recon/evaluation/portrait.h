@@ -17,6 +17,7 @@ struct View {
   Pose world_from_camera = Pose::Identity();
   Image8 valid;  // as large as the camera's image, 0 = stays background; empty = every pixel
   Rgb8 background = {255, 255, 255};
+  double fade_mm = 0;  // the lamp's light falls to half at this distance along the ray; 0 = it doesn't fall
 };
 
 class Portrait {
@@ -26,8 +27,8 @@ class Portrait {
 
   // Three channels, the mean of 4×4 rays a pixel. A surface point has its face's interpolated vertex colour
   // times 0.3 + 0.7·|cos| of the angle between the ray and the interpolated vertex normals: a lamp at the
-  // camera, both sides alike. `colors` has an entry a vertex. Pixels without a ray or a surface are
-  // background.
+  // camera, both sides alike; where it fades, times 1/(1 + (distance/fade_mm)²). `colors` has an entry a
+  // vertex. Pixels without a ray or a surface are background.
   Image8 Draw(const View& view, const std::vector<Rgb8>& colors) const;
 
  private:

@@ -11,6 +11,7 @@
 #include "recon/evaluation/layout.h"
 #include "recon/evaluation/portrait.h"
 #include "recon/evaluation/visibility.h"
+#include "recon/evaluation/walk.h"
 
 namespace lumen {
 namespace {
@@ -154,6 +155,8 @@ void WriteEvaluationPictures(const Evaluation& evaluation, const Mesh& reconstru
   const int sheet_width = WithinView(sequence, 0, kSheetHeight).camera.width;
   WriteImage(folder / "sheet.png",
              Sheet(subjects, CommonOutsideView(truth, truth_seen, sheet_width, kSheetHeight), kSheetHeight));
+  progress.Update(0.8);
+  WriteWalk(reconstruction, evaluation.frames_seeing, sequence, folder);
 }
 
 }  // namespace lumen
