@@ -15,7 +15,7 @@ struct ExportOptions {
   ExportFormat format = ExportFormat::kColmap;
   bool rectify = false;     // pinhole images in any format; NeuS has no others
   double fov_deg = 100;     // of the pinhole, across the image
-  double max_fit_px = 0.5;  // a fisheye that fits worse is refused
+  double max_fit_px = 1.5;  // a fisheye that fits worse somewhere is refused
   bool link = false;        // symbolic links in place of copies, where images stay as they are
 };
 
