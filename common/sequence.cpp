@@ -34,6 +34,8 @@ bool IsFile(const fs::path& path) {
 struct Gains {
   std::vector<double> values;
   std::optional<ConfigTable> table;
+  std::vector<double> log_errors;  // of estimated ones
+  std::optional<ConfigTable> errors_table;
 };
 
 void ReadGains(const ConfigTable& root, Gains* gains) {
@@ -78,16 +80,33 @@ void ReadToml(Sequence* sequence, Gains* gains) {
   config.RejectUnknown();
 }
 
+// Standard errors of what calibration.toml holds.
+void ReadUncertainty(const ConfigTable& root, Gains* gains) {
+  const auto table = root.Optional("uncertainty");
+  if (!table) return;
+  for (const char* key : {"spread", "gamma"}) {
+    if (table->Has(key)) table->Number(key, kNotNegative);
+  }
+  if (!table->Has("log_gain")) return;
+  gains->log_errors = table->Numbers("log_gain", 0, kNotNegative);
+  gains->errors_table = table;
+  const auto frames = root.Optional("frames");
+  if (!frames || !frames->Has("gain")) table->Fail("log_gain", "there is no gain in [frames] that it is of");
+}
+
 // What `lumen calibrate` has found out: whole tables in place of the sequence's own.
 void ReadCalibrationOnTop(Sequence* sequence, Gains* gains) {
   const fs::path file = sequence->folder / kCalibrationName;
   if (!IsFile(file)) return;
   const Config config = Config::Read(file);
   const ConfigTable root = config.root();
+  root.Choice("format", "lumen-calibration", {"lumen-calibration"});
+  if (root.Integer("version", 1) != 1) root.Fail("version", "this program reads version 1 only");
   if (const auto light = root.Optional("light")) sequence->calibration.light = ReadLight(*light);
   if (const auto response = root.Optional("response"))
     sequence->calibration.response = ReadResponse(*response);
   ReadGains(root, gains);
+  ReadUncertainty(root, gains);
   config.RejectUnknown();
 }
 
@@ -152,8 +171,16 @@ void AssignGains(const Gains& gains, const std::vector<std::optional<size_t>>& l
     gains.table->Fail("gain", "has " + std::to_string(gains.values.size()) + " elements, but there are " +
                                   std::to_string(frames->size()) + " frames");
   }
+  if (gains.errors_table && gains.log_errors.size() != gains.values.size()) {
+    gains.errors_table->Fail("log_gain", "has " + std::to_string(gains.log_errors.size()) +
+                                             " elements, but there are " +
+                                             std::to_string(gains.values.size()) + " gains");
+  }
   for (size_t i = 0; i < frames->size(); ++i) {
-    if (by_frame || line[i]) (*frames)[i].gain = gains.values[by_frame ? i : *line[i]];
+    if (!by_frame && !line[i]) continue;
+    const size_t at = by_frame ? i : *line[i];
+    (*frames)[i].gain = gains.values[at];
+    if (gains.errors_table) (*frames)[i].log_gain_error = gains.log_errors[at];
   }
 }
 
@@ -272,7 +299,7 @@ Sequence ReadSequence(const fs::path& folder, const ReadOptions& options) {
       sequence.calibration.mask = ReadMask(folder / kMaskName, sequence.calibration.camera);
     }
   }
-  ReadCalibrationOnTop(&sequence, &gains);
+  if (options.calibration) ReadCalibrationOnTop(&sequence, &gains);
   sequence.frames = FramesWithColor(folder);
   AssignPosesAndGains(gains, options, &sequence);
   if (sequence.ground_truth_mesh.empty() && IsFile(folder / kCoverageMeshName)) {

@@ -37,6 +37,8 @@ struct SequenceFrame {
   int number = 0;  // NNNN of its files
   Pose world_from_camera = Pose::Identity();
   std::optional<double> gain;  // nothing = unknown, to be estimated
+  // Standard error of the gain's logarithm, where the gain is an estimate; nothing = known for good.
+  std::optional<double> log_gain_error;
   // Files; an empty path = there is none.
   std::filesystem::path color, depth, normals, flow, occlusion;
 };
@@ -60,10 +62,12 @@ struct ReadOptions {
   // Frames whose pose is missing or damaged, and those that are missing themselves, are left out and named in
   // left_out; otherwise they are errors.
   bool skip_damaged = false;
+  bool calibration = true;  // false: calibration.toml is not read
 };
 
 // Reads sequence.toml (or falls back to C3VD's calibration), calibration.toml on top where there is one
-// ([light], [response] and [frames] gain, each in place of the sequence's own), pose.txt, and finds the
+// ([light], [response] and [frames] gain, each in place of the sequence's own; [uncertainty] has standard
+// errors: log_gain, one a frame, without which gains count as exact; spread; gamma), pose.txt, and finds the
 // frames' files, in the layout of C3VD v1 or v2. Pixels are not read. A C3VD folder may be a part of a
 // download: where it has more poses than colour files, a frame's number is that of its line. Throws
 // InputError naming file and place: unknown or missing keys, no frame at all, a mask of another size, gains

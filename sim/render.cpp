@@ -82,8 +82,12 @@ class Renderer {
   }
 
   std::vector<double> Gains() {
-    if (!scene_.sensor.auto_gain)
-      return std::vector<double>(scene_.world_from_camera.size(), scene_.sensor.gain);
+    if (!scene_.sensor.auto_gain) {
+      std::vector<double> gains(scene_.world_from_camera.size(), scene_.sensor.gain);
+      for (size_t i = 0; scene_.sensor.gain_swing && i < gains.size(); ++i)
+        gains[i] = GainAt(scene_.sensor.gain, *scene_.sensor.gain_swing, static_cast<int>(i));
+      return gains;
+    }
     const Meter meter(scene_, valid_, options_.seed);
     std::vector<double> brightness;
     for (int frame = 0; frame < last_; ++frame) {

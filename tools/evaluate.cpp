@@ -4,6 +4,7 @@
 
 #include "common/files.h"
 #include "common/progress.h"
+#include "recon/evaluation/depth_error.h"
 #include "recon/evaluation/evaluation_json.h"
 #include "recon/evaluation/evaluation_table.h"
 #include "recon/evaluation/sheet.h"
@@ -16,12 +17,20 @@ namespace {
 struct Arguments {
   std::filesystem::path mesh, folder;
   SequenceArguments sequence;
+  bool depth = false;
 };
+
+nlohmann::json CompareDepth(const Mesh& reconstruction, const Sequence& sequence) {
+  const std::vector<FrameDepthError> errors = DepthErrors(reconstruction, sequence);
+  std::cout << ToTable(errors);
+  return {{"depth", ToJson(errors)}};
+}
 
 nlohmann::json Run(const Arguments& arguments, const CommonOptions& common) {
   const Sequence sequence = ReadSequence(arguments.sequence);
   const Mesh reconstruction = ReadMesh(arguments.mesh);
   RequireSurface(reconstruction, arguments.mesh.string());
+  if (arguments.depth) return CompareDepth(reconstruction, sequence);
   const Mesh truth = ReadGroundTruth(sequence);
   EvaluateOptions options;
   options.seed = common.seed;
@@ -46,6 +55,9 @@ void AddEvaluate(CLI::App* app) {
   command->add_option("MESH", arguments->mesh, "the reconstruction (PLY, OBJ, OFF, STL; mm, world axes)")
       ->required();
   AddSequenceArguments(command, &arguments->sequence, "SEQ");
+  command->add_flag(
+      "--depth", arguments->depth,
+      "instead, hold each frame's depth against its depth file, up to scale; needs no true mesh");
   command->add_option("-o,--output", arguments->folder, "folder for the coloured meshes and pictures");
 }
 

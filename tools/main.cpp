@@ -25,6 +25,7 @@ int main(int argc, char** argv) {
   lumen::AddImport(&app);
   lumen::AddCheck(&app);
   lumen::AddPhotometry(&app);
+  lumen::AddCalibrate(&app);
   lumen::AddCost(&app);
   lumen::AddBudget(&app);
   try {

@@ -30,6 +30,7 @@ void AddImport(CLI::App* app);
 void AddLoop(CLI::App* app);
 void AddCheck(CLI::App* app);
 void AddPhotometry(CLI::App* app);
+void AddCalibrate(CLI::App* app);
 void AddCost(CLI::App* app);
 void AddBudget(CLI::App* app);
 

@@ -238,6 +238,10 @@ void Trainer::UpdateGains(const AdamStep& step) {
   // The first frame's gain is 1: the others' are relative to it.
   AdamUpdate(step, gradient.size() - 1, state_.log_gain.data() + 1, gradient.data() + 1,
              state_.log_gain_first.data() + 1, state_.log_gain_second.data() + 1);
+  for (size_t i = 1; i < gradient.size(); ++i) {
+    const auto reach = static_cast<float>(frames_.LogGainReach(static_cast<int>(i)));
+    state_.log_gain[i] = std::clamp(state_.log_gain[i], -reach, reach);
+  }
 }
 
 // Not before the surface has taken some shape, and ever more slowly in the second half.

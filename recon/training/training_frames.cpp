@@ -38,7 +38,8 @@ TrainingFrames::TrainingFrames(const Sequence& sequence, int count, bool lit)
     const Image8 color = ReadColor(sequence, source);
     Frame frame;
     frame.gain = source.gain.value_or(1.0);
-    gains_known_ = gains_known_ && source.gain.has_value();
+    frame.log_gain_reach = source.gain ? 3 * source.log_gain_error.value_or(0.0) : INFINITY;
+    gains_known_ = gains_known_ && source.gain.has_value() && !source.log_gain_error;
     frame.rgb.reserve(pixels.size() * 3);
     for (size_t pixel : pixels) {
       frame.rgb.insert(frame.rgb.end(), color.data.begin() + 3 * pixel, color.data.begin() + 3 * pixel + 3);
@@ -113,6 +114,8 @@ void TrainingFrames::FindScale(const Sequence& sequence) {
   if (gains_known_) CheckGains(folder, numbers_, radiance);
   scale_ = std::pow(2 * sum / static_cast<double>(count), 1 / inverse_gamma());
 }
+
+double TrainingFrames::LogGainReach(int frame) const { return frames_[frame].log_gain_reach; }
 
 Vec3d TrainingFrames::MeanRadiance(int frame) const {
   Vec3d sum = Vec3d::Zero();

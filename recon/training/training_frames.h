@@ -26,7 +26,11 @@ class TrainingFrames {
   const Light& light() const { return calibration_.light; }
   // Unit rays in camera axes of the image's valid pixels.
   const std::vector<Vec3f>& pixel_rays() const { return rays_; }
+  // Of every frame, and for good.
   bool gains_known() const { return gains_known_; }
+  // By how much the logarithm of a frame's gain may be off from what the sequence says: three standard errors
+  // of an estimate; infinite where it says nothing, 0 where it knows.
+  double LogGainReach(int frame) const;
   // 1/γ of the comparison; for an sRGB response that of the 2.2 which approximates it.
   double inverse_gamma() const;
 
@@ -42,6 +46,7 @@ class TrainingFrames {
   struct Frame {
     std::vector<uint8_t> rgb;  // of the valid pixels, three each
     double gain;               // 1 where unknown
+    double log_gain_reach;
   };
   double Normaliser(size_t pixel) const;  // vignetting · L_e
   std::vector<size_t> FindPixels();       // fills what there is one of a pixel; their places in the image

@@ -21,6 +21,13 @@ AutoGain ReadAutoGain(const ConfigTable& table) {
   return options;
 }
 
+GainSwing ReadGainSwing(const ConfigTable& table) {
+  GainSwing swing;
+  swing.factor = table.Number("factor", swing.factor, {1, 1e3});
+  swing.period = table.Number("period", swing.period, {1, 1e6});
+  return swing;
+}
+
 double PixelVignetting(const Response& response, const Camera<double>& camera, int x, int y) {
   const auto ray = camera.Unproject(Vec2d(x, y));
   return ray ? Vignetting(response, ray->z()) : 0.0;
@@ -55,10 +62,13 @@ Eigen::Matrix2d Propagator(double omega, double damping, double time_s) {
 Sensor ReadSensor(const ConfigTable& table) {
   Sensor sensor;
   if (const auto auto_gain = table.Optional("auto_gain")) {
-    if (table.Has("gain")) table.Fail("gain", "has no effect beside auto_gain; leave one of the two out");
+    for (const char* key : {"gain", "gain_swing"}) {
+      if (table.Has(key)) table.Fail(key, "has no effect beside auto_gain; leave one of the two out");
+    }
     sensor.auto_gain = ReadAutoGain(*auto_gain);
   } else {
     sensor.gain = table.Number("gain", sensor.gain, kPositive);
+    if (const auto swing = table.Optional("gain_swing")) sensor.gain_swing = ReadGainSwing(*swing);
   }
   sensor.record_gain = table.Flag("record_gain", sensor.record_gain);
   if (const auto noise = table.Optional("noise")) sensor.noise = ReadSensorNoise(*noise);
@@ -107,6 +117,10 @@ std::vector<double> RunAutoGain(const AutoGain& options, const Response& respons
     gains[frame] = std::exp(state[0]);
   }
   return gains;
+}
+
+double GainAt(double gain, const GainSwing& swing, int frame) {
+  return gain * std::pow(swing.factor, std::sin(2 * kPi * frame / swing.period) / 2);
 }
 
 ImageF VignettingMap(const Response& response, const Camera<double>& camera) {

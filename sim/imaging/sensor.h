@@ -24,9 +24,16 @@ struct AutoGain {
   double frame_rate_hz = 29.97;
 };
 
+// A gain that goes up and down from frame to frame by a known rule: what a calibration is held against.
+struct GainSwing {
+  double factor = 4;      // the largest gain over the smallest
+  double period = 13.37;  // frames
+};
+
 struct Sensor {
   double gain = 1;
-  std::optional<AutoGain> auto_gain;  // then `gain` doesn't count
+  std::optional<GainSwing> gain_swing;  // about `gain`
+  std::optional<AutoGain> auto_gain;    // then `gain` doesn't count
   std::optional<SensorNoise> noise;
   std::optional<Jpeg> jpeg;
   std::optional<Shutter> shutter;
@@ -45,6 +52,9 @@ double MeterBrightness(const Response& response, const ImageF& radiance, const I
 // rest. A black frame (brightness 0) calls for no change.
 std::vector<double> RunAutoGain(const AutoGain& options, const Response& response,
                                 const std::vector<double>& brightness);
+
+// gain · factor^(sin(2π frame/period)/2).
+double GainAt(double gain, const GainSwing& swing, int frame);
 
 // Vignetting of every pixel, one channel; computed once a render.
 ImageF VignettingMap(const Response& response, const Camera<double>& camera);

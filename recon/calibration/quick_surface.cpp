@@ -1,0 +1,59 @@
+#include "recon/calibration/quick_surface.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/error.h"
+#include "common/progress.h"
+#include "recon/surface/extract.h"
+#include "recon/training/trainer.h"
+
+namespace lumen {
+namespace {
+
+std::vector<int> UniformFrames(int available, int count) {
+  const int taken = std::min(available, count);
+  std::vector<int> frames;
+  for (int i = 0; i < taken; ++i) {
+    frames.push_back(taken > 1 ? static_cast<int>(std::lround(double(i) * (available - 1) / (taken - 1)))
+                               : 0);
+  }
+  return frames;
+}
+
+}  // namespace
+
+QuickSurface LearnQuickSurface(const Sequence& sequence, const QuickSurfaceOptions& options, uint64_t seed) {
+  QuickSurface surface;
+  surface.frames = UniformFrames(static_cast<int>(sequence.frames.size()), options.frames);
+  Sequence taken = sequence;
+  taken.frames.clear();
+  for (int index : surface.frames) {
+    taken.frames.push_back(sequence.frames[index]);
+    taken.frames.back().gain.reset();
+    taken.frames.back().log_gain_error.reset();
+  }
+  TrainOptions training = ReadTrainOptions("fast", {});
+  training.schedule.iterations = options.iterations;
+  const TrainingFrames frames(taken, static_cast<int>(taken.frames.size()), true);
+  Trainer trainer(frames, training, seed);
+  Progress progress("surface");
+  for (int64_t i = 0; i < options.iterations; ++i) {
+    const double done = static_cast<double>(i) / static_cast<double>(options.iterations);
+    trainer.Step(done);
+    progress.Update(done);
+  }
+  if (2 * trainer.state().skipped_steps > options.iterations) {
+    throw InputError(
+        sequence.folder.string() +
+        ": no surface can be learnt, half of the steps had no finite gradient; check poses and light");
+  }
+  surface.log_gain.assign(trainer.state().log_gain.begin(), trainer.state().log_gain.end());
+  surface.mesh = ExtractMesh(trainer.field(), trainer.Weights(), trainer.origin(), {options.cell_mm});
+  if (surface.mesh.faces.empty()) {
+    throw InputError(sequence.folder.string() + ": no surface can be learnt; check poses and light");
+  }
+  return surface;
+}
+
+}  // namespace lumen
