@@ -200,6 +200,18 @@ Sensor Read(const std::string& text) {
   return sensor;
 }
 
+// Up by the root of the factor a quarter of the period on, down by it after three.
+TEST(Sensor, GainSwingsByItsFactor) {
+  const Sensor sensor = Read("gain = 3\n[gain_swing]\nfactor = 4\nperiod = 8");
+  ASSERT_TRUE(sensor.gain_swing);
+  EXPECT_NEAR(GainAt(sensor.gain, *sensor.gain_swing, 0), 3, 1e-15);
+  EXPECT_NEAR(GainAt(sensor.gain, *sensor.gain_swing, 2), 6, 1e-14);
+  EXPECT_NEAR(GainAt(sensor.gain, *sensor.gain_swing, 6), 1.5, 1e-14);
+  EXPECT_FALSE(Read("gain = 3").gain_swing);
+  EXPECT_NE(ErrorOf([] { Read("[gain_swing]\n[auto_gain]"); }).find("gain_swing: has no effect beside"),
+            std::string::npos);
+}
+
 TEST(Sensor, ReadsItsTable) {
   EXPECT_EQ(Read("").gain, 1);
   EXPECT_FALSE(Read("").auto_gain);

@@ -12,7 +12,7 @@ namespace lumen {
 
 struct QuickSurfaceOptions {
   int frames = 20;  // taken uniformly over the sequence
-  int64_t iterations = 1500;
+  int64_t iterations = 4000;
   double cell_mm = 1.5;  // of the mesh
 };
 

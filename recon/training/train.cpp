@@ -2,6 +2,7 @@
 
 #include <fmt/core.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <ctime>
@@ -40,14 +41,25 @@ double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
+// Without parallax a factor of light between walls that is free at every place explains any frame, on any
+// surface: the surface then leaves through the bounds.
+TrainOptions ForFrames(TrainOptions options, int taken) {
+  const bool free_ambient = options.field.reflectance == Reflectance::kLambertian &&
+                            options.field.interreflection == Interreflection::kMean;
+  if (taken > 1 || !free_ambient) return options;
+  Say("one frame alone can't tell light between walls from distance: network.interreflection = \"none\"");
+  options.field.interreflection = Interreflection::kNone;
+  return options;
+}
+
 class Run {
  public:
   Run(const Sequence& sequence, const TrainOptions& options, const TrainRun& run)
-      : options_(options),
+      : options_(ForFrames(options, std::min(options.frames, static_cast<int>(sequence.frames.size())))),
         run_(run),
         frames_(sequence, options.frames, options.field.reflectance != Reflectance::kUnlit),
-        trainer_(frames_, options, run.seed),
-        settings_("seed = " + std::to_string(run.seed) + "\n" + FormatTrainOptions(options)) {}
+        trainer_(frames_, options_, run.seed),
+        settings_("seed = " + std::to_string(run.seed) + "\n" + FormatTrainOptions(options_)) {}
 
   TrainResult Go() {
     CreateFolder(run_.folder);
