@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/error.h"
+#include "tests/support.h"
 
 namespace lumen {
 namespace {
@@ -208,7 +209,7 @@ TEST(Sensor, GainSwingsByItsFactor) {
   EXPECT_NEAR(GainAt(sensor.gain, *sensor.gain_swing, 2), 6, 1e-14);
   EXPECT_NEAR(GainAt(sensor.gain, *sensor.gain_swing, 6), 1.5, 1e-14);
   EXPECT_FALSE(Read("gain = 3").gain_swing);
-  EXPECT_NE(ErrorOf([] { Read("[gain_swing]\n[auto_gain]"); }).find("gain_swing: has no effect beside"),
+  EXPECT_NE(test::ErrorOf([] { Read("[gain_swing]\n[auto_gain]"); }).find("gain_swing: has no effect beside"),
             std::string::npos);
 }
 
