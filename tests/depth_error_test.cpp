@@ -66,6 +66,9 @@ TEST_F(DepthErrorOfFrame, GuessesAndReconstructionAreToldApart) {
   // Uniform u on [1, 2): the variance of log u is 1 − 2 (ln 2)².
   const double uniform = std::sqrt(1 - 2 * std::log(2.0) * std::log(2.0));
   EXPECT_NEAR(error.constant.error, uniform, 2e-3);
+  EXPECT_NEAR(error.reconstruction.error, error.constant.error, 1e-5);
+  // The mean of log u is 2 ln 2 − 1.
+  EXPECT_NEAR(error.reconstruction.scale, std::exp(2 * std::log(2.0) - 1), 5e-3);
   EXPECT_LT(error.brightness.error, 0.02);  // 8 bits
   EXPECT_NE(ToTable(errors).find("brightness alone"), std::string::npos);
 }

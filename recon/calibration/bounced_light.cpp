@@ -15,6 +15,9 @@ constexpr double kLift_mm = 0.7;
 // Bounces among places that a frame doesn't show; of light that comes from those it shows.
 constexpr int kRounds = 6;
 
+// One product with the form factors serves so many.
+constexpr int kFramesTogether = 8;
+
 // Of places whose albedo nobody has seen.
 double MedianResponse(const WallModel& model, int channel) {
   std::vector<float> known;
@@ -65,22 +68,22 @@ Eigen::ArrayXXf BouncedLight(const Eigen::MatrixXf& factors, const Sightings& si
     response[i] = std::isfinite(log_response) ? std::exp(log_response) : static_cast<float>(unknown);
   }
   Eigen::ArrayXXf bounced = Eigen::ArrayXXf::Zero(places, frames);
-  ParallelFor(0, frames, [&](int64_t frame) {
-    const float gain = static_cast<float>(std::exp(model.log_gain[frame]) / kPi);
-    Eigen::VectorXf leaves(places), arrives = Eigen::VectorXf::Zero(places);
+  ParallelChunks(0, frames, kFramesTogether, [&](int64_t first, int64_t last) {
+    Eigen::MatrixXf leaves(places, last - first), arrives = Eigen::MatrixXf::Zero(places, last - first);
     for (int round = 0; round < kRounds; ++round) {
-      for (Eigen::Index i = 0; i < places; ++i) {
-        const float value = sightings.value[channel](i, frame);
-        const float predicted = response[i] * (gain * sightings.irradiance(i, frame) + strength * arrives[i]);
-        if (std::isfinite(value)) {
-          leaves[i] = value;
-        } else {
-          leaves[i] = std::isinf(value) ? std::max(1.0f, predicted) : predicted;
+      for (int64_t frame = first; frame < last; ++frame) {
+        const float gain = static_cast<float>(std::exp(model.log_gain[frame]) / kPi);
+        for (Eigen::Index i = 0; i < places; ++i) {
+          const float value = sightings.value[channel](i, frame);
+          const float predicted =
+              response[i] * (gain * sightings.irradiance(i, frame) + strength * arrives(i, frame - first));
+          const float unseen = std::isinf(value) ? std::max(1.0f, predicted) : predicted;
+          leaves(i, frame - first) = std::isfinite(value) ? value : unseen;
         }
       }
-      arrives = factors * leaves;
+      arrives.noalias() = factors * leaves;
     }
-    bounced.col(frame) = arrives.array();
+    bounced.middleCols(first, last - first) = arrives.array();
   });
   return bounced;
 }

@@ -101,6 +101,10 @@ class Calibrator {
       if (options.contrast) result->gamma.value = GammaOf(result->fit).value;
     }
     const Eigen::VectorXd& gains = result->fit.wall.log_gain;
+    if (!gains.allFinite()) {
+      throw InputError(sequence_.folder.string() +
+                       ": the places that frames share don't tell their gains; check poses and light");
+    }
     Eigen::VectorXd variance = result->fit.log_gain_error.array().square();
     const std::vector<GainFitOptions> halves = Halves(options);
     for (size_t i = 0; i < halves.size(); i += 2) {

@@ -209,7 +209,7 @@ class Problem {
         auto score = scores_.col(group.cell);
         AddRow(group.rows[i].frame, slopes[i], weights[i] * residuals[i], &score);
       }
-      normal_.noalias() -= mean_row * mean_row.transpose() / weight_sum;
+      TakeOutAlbedo(group, mean_row, weight_sum);
     }
     // Centred on their own means, residuals are too small by the share of the albedos in the unknowns.
     const double share = 1 - double(groups_.size()) / double(std::max<size_t>(1, magnitudes.size()));
@@ -231,6 +231,16 @@ class Problem {
       normal_(frames_ + i, frame) += cross;
       for (int k = 0; k < kExtras; ++k)
         normal_(frames_ + i, frames_ + k) += weight * slope.by_extra[i] * slope.by_extra[k];
+    }
+  }
+
+  // A group names few of the frames: only these columns' products differ from 0.
+  void TakeOutAlbedo(const Group& group, const VectorXd& sum, double weight_sum) {
+    std::vector<int> columns;
+    for (const Row& row : group.rows) columns.push_back(row.frame);
+    for (int i = 0; i < kExtras; ++i) columns.push_back(frames_ + i);
+    for (int i : columns) {
+      for (int k : columns) normal_(i, k) -= sum[i] * sum[k] / weight_sum;
     }
   }
 
