@@ -36,8 +36,9 @@ class Calibrator {
   }
 
  private:
-  // Near and far, shallow and steep, of what the fit uses. An error of the surface, or light that the model
-  // doesn't know, tells differently on them.
+  // Near and far, shallow and steep, red and the other channels of what the fit uses. An error of the
+  // surface, or of the light that the model supposes, tells differently on them: between walls red goes to
+  // and fro most.
   std::vector<GainFitOptions> Halves(const GainFitOptions& whole) const {
     std::vector<double> distances, cosines;
     for (Eigen::Index i = 0; i < sightings_.view_cosine.size(); ++i) {
@@ -47,9 +48,11 @@ class Calibrator {
       cosines.push_back(cosine);
     }
     const double distance = MedianOf(std::move(distances)), cosine = MedianOf(std::move(cosines));
-    std::vector<GainFitOptions> halves(4, whole);
+    std::vector<GainFitOptions> halves(6, whole);
     halves[0].distance_mm.high = halves[1].distance_mm.low = distance;
     halves[2].cosine.high = halves[3].cosine.low = cosine;
+    halves[4].channels = {true, false, false};
+    halves[5].channels = {false, true, true};
     for (GainFitOptions& half : halves) half.min_places = 2;
     return halves;
   }

@@ -24,7 +24,7 @@ struct CalibrateOptions {
 };
 
 // The standard error holds the scatter among places and what halves of the data (near and far, steep and
-// shallow) differ by.
+// shallow, red and the other channels) differ by.
 struct Estimate {
   double value = 0;
   double standard_error = 0;

@@ -100,6 +100,7 @@ class Problem {
       const std::array<int, 3> cube = {int(std::floor(at.x())), int(std::floor(at.y())),
                                        int(std::floor(at.z()))};
       for (int c = 0; c < 3; ++c) {
+        if (!options_.channels[c]) continue;
         Group group{place, c, 0, {}};
         for (int f = 0; f < frames_; ++f) {
           if (!std::isfinite(s.value[c](place, f)) || !(s.irradiance(place, f) > 0)) continue;

@@ -2,6 +2,7 @@
 // by gain and by light only.
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "common/config.h"
@@ -19,6 +20,7 @@ struct GainFitOptions {
   // much.
   Range cosine = {0.2, 1};
   Range distance_mm = {3, 1e3};
+  std::array<bool, 3> channels{true, true, true};  // that count
   double cell_mm = 8;   // side of the cubes in the world whose places may err together
   int min_places = 30;  // that a frame must share with others
 };
