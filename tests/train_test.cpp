@@ -81,6 +81,21 @@ TEST(Train, NeusSeesNoLightAndStillEndsWithAMesh) {
   EXPECT_TRUE(std::filesystem::exists(folder / "run/mesh.ply"));
 }
 
+// A single frame can't tell light between walls from distance, two can.
+TEST(Train, OneFrameDoesWithoutTheFreeFactorOfLightBetweenWalls) {
+  const auto configured = [](size_t frames) {
+    const ScratchFolder folder;
+    Sequence sequence = SmallSequence();
+    sequence.frames.resize(frames);
+    TrainRun run;
+    run.folder = folder.path();
+    Train(sequence, ReadTrainOptions("fast", SmallSettings(20)), run);
+    return ReadFile(folder / "config.toml");
+  };
+  EXPECT_NE(configured(1).find("interreflection = \"none\""), std::string::npos);
+  EXPECT_NE(configured(2).find("interreflection = \"mean\""), std::string::npos);
+}
+
 TEST(TrainOptions, AreReadBackFromTheirText) {
   const TrainOptions options = ReadTrainOptions("fast", {"loss.eikonal=0.25", "network.sdf_hidden=[16, 8]"});
   EXPECT_EQ(options.loss.eikonal, 0.25);
