@@ -149,7 +149,7 @@ fs::path ConfigTable::Path(std::string_view key) const {
   const toml::node& node = node_->Require(key, "a path");
   const fs::path path = node_->ToString(key, node);
   if (path.empty()) node_->Fail(key, node, "is empty, but must be a path");
-  return node_->document->Resolved(Joined(node_->path, key), path);
+  return node_->document->Resolved(Joined(node_->path, key), node, path);
 }
 
 std::vector<double> ConfigTable::Numbers(std::string_view key, size_t size, Range range) const {
@@ -215,14 +215,18 @@ Config Config::Read(const fs::path& file, const std::vector<std::string>& settin
   return Parse(ReadFile(file), file.string(), file.parent_path(), settings);
 }
 
+Config Config::ReadWithBase(const fs::path& file, const std::vector<std::string>& settings) {
+  return Config(
+      std::make_shared<ConfigDocument>(ReadFile(file), file.string(), file.parent_path(), settings, true));
+}
+
 Config Config::Parse(std::string_view text, const std::string& name, const fs::path& folder,
                      const std::vector<std::string>& settings) {
-  const auto document = std::make_shared<ConfigDocument>(text, name, folder, settings);
-  Config config;
-  config.root_ =
-      std::make_shared<const ConfigTable::Node>(ConfigTable::Node{document, &document->root(), ""});
-  return config;
+  return Config(std::make_shared<ConfigDocument>(text, name, folder, settings));
 }
+
+Config::Config(std::shared_ptr<ConfigDocument> document)
+    : root_(std::make_shared<const ConfigTable::Node>(ConfigTable::Node{document, &document->root(), ""})) {}
 
 ConfigTable Config::root() const { return ConfigTable(root_); }
 

@@ -15,6 +15,8 @@
 
 namespace lumen {
 
+class ConfigDocument;
+
 // Closed interval that a number must lie in.
 struct Range {
   double low = -std::numeric_limits<double>::infinity();
@@ -74,6 +76,11 @@ class Config {
   // settings: "path.to.key=value", the value in TOML's notation, a bare word being a string; an index into an
   // array of tables is a number ("light.source.0.spread=2").
   static Config Read(const std::filesystem::path& file, const std::vector<std::string>& settings = {});
+  // The same of a file whose key `base` may name another, from its own folder, that holds what it doesn't
+  // say itself: tables are joined, anything else (arrays of tables too) is replaced. Messages name the file
+  // that a key stands in; its relative paths count from there. A base has no base of its own.
+  static Config ReadWithBase(const std::filesystem::path& file,
+                             const std::vector<std::string>& settings = {});
   // `name` stands for the file in messages; relative paths count from `folder`.
   static Config Parse(std::string_view text, const std::string& name,
                       const std::filesystem::path& folder = {},
@@ -85,6 +92,7 @@ class Config {
   void RejectUnknown() const;
 
  private:
+  explicit Config(std::shared_ptr<ConfigDocument> document);
   std::shared_ptr<const ConfigTable::Node> root_;
 };
 

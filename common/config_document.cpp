@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/error.h"
+#include "common/files.h"
 
 namespace lumen {
 namespace {
@@ -77,6 +78,29 @@ size_t ElementOf(const toml::array& array, const std::string& part, const std::s
   return index;
 }
 
+// Throws InputError naming the line. Nodes remember the name.
+toml::table ParsedText(std::string_view text, const std::string& name) {
+  try {
+    return toml::parse(text, name);
+  } catch (const toml::parse_error& error) {
+    throw InputError(name + ":" + std::to_string(error.source().begin.line) +
+                     ": not TOML: " + std::string(error.description()));
+  }
+}
+
+// Puts everything of one table into another: tables into tables, anything else in place of what is there.
+void Overlay(toml::table&& over, toml::table* under) {
+  for (auto&& [key, value] : over) {
+    toml::table* own = value.as_table();
+    toml::node* other = under->get(key.str());
+    if (own && other && other->is_table()) {
+      Overlay(std::move(*own), other->as_table());
+    } else {
+      under->insert_or_assign(key, std::move(value));
+    }
+  }
+}
+
 // "a.b.c" → a, b, c.
 std::vector<std::string> Parts(const std::string& path) {
   std::vector<std::string> parts;
@@ -115,15 +139,35 @@ std::string KindOf(const toml::node& node) {
 }
 
 ConfigDocument::ConfigDocument(std::string_view text, const std::string& name,
-                               const std::filesystem::path& folder, const std::vector<std::string>& settings)
-    : name_(name), folder_(folder) {
-  try {
-    root_ = toml::parse(text);
-  } catch (const toml::parse_error& error) {
-    throw InputError(name + ":" + std::to_string(error.source().begin.line) +
-                     ": not TOML: " + std::string(error.description()));
-  }
+                               const std::filesystem::path& folder, const std::vector<std::string>& settings,
+                               bool may_have_base)
+    : name_(name), folder_(folder), root_(ParsedText(text, name)) {
+  if (may_have_base && root_.contains("base")) PutOnBase();
   for (const std::string& setting : settings) Set(setting);
+}
+
+void ConfigDocument::PutOnBase() {
+  const toml::node& key = *root_.get("base");
+  const auto* path = key.as_string();
+  if (!path) Fail("base", key, "is " + KindOf(key) + ", but must be a path in quotes");
+  const std::filesystem::path file = folder_ / path->get();
+  std::error_code ignored;
+  if (!std::filesystem::is_regular_file(file, ignored)) {
+    Fail("base", key, "there is no file " + file.string());
+  }
+  base_name_ = file.string();
+  base_folder_ = file.parent_path();
+  toml::table base = ParsedText(ReadFile(file), base_name_);
+  if (base.contains("base")) Fail("base", *base.get("base"), "a base has no base of its own; leave it out");
+  root_.erase("base");
+  Overlay(std::move(root_), &base);
+  root_ = std::move(base);
+}
+
+// The file whose text the node stands in.
+const std::string& ConfigDocument::SourceOf(const toml::node& node) const {
+  const auto& path = node.source().path;
+  return path && !base_name_.empty() && *path == base_name_ ? base_name_ : name_;
 }
 
 // Tables on the setting's way that don't exist are made.
@@ -185,13 +229,14 @@ void ConfigDocument::Fail(const std::string& path, const toml::node& node, const
   const std::string* setting = SettingOf(path);
   // Nodes that the command line has made have no line; a file's root begins with its first.
   const std::string line = std::to_string(std::max(node.source().begin.line, 1u));
-  const std::string place = setting ? "--set " + *setting : name_ + ":" + line;
+  const std::string place = setting ? "--set " + *setting : SourceOf(node) + ":" + line;
   throw InputError(place + ": " + (path.empty() ? "" : path + ": ") + problem);
 }
 
-std::filesystem::path ConfigDocument::Resolved(const std::string& path,
+std::filesystem::path ConfigDocument::Resolved(const std::string& path, const toml::node& node,
                                                const std::filesystem::path& file) const {
-  return SettingOf(path) ? file : folder_ / file;
+  if (SettingOf(path)) return file;
+  return (&SourceOf(node) == &base_name_ ? base_folder_ : folder_) / file;
 }
 
 const toml::node* ConfigDocument::Find(const toml::table& table, std::string_view key) {

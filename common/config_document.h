@@ -16,9 +16,10 @@ namespace lumen {
 
 class ConfigDocument {
  public:
-  // Throws InputError where the text isn't TOML or a setting can't be put into it.
+  // Throws InputError where the text isn't TOML or a setting can't be put into it. may_have_base: the text's
+  // key `base` names a file, from its folder, that holds what the text doesn't.
   ConfigDocument(std::string_view text, const std::string& name, const std::filesystem::path& folder,
-                 const std::vector<std::string>& settings);
+                 const std::vector<std::string>& settings, bool may_have_base = false);
 
   const toml::table& root() const { return root_; }
 
@@ -29,9 +30,10 @@ class ConfigDocument {
   // Throws InputError for the first key that nobody has asked for.
   void RejectUnknown();
 
-  // The value under the path is a file name in the text: it counts from the text's folder. From the command
+  // The node under the path is a file name in a text: it counts from that text's folder. From the command
   // line it stands as it is.
-  std::filesystem::path Resolved(const std::string& path, const std::filesystem::path& file) const;
+  std::filesystem::path Resolved(const std::string& path, const toml::node& node,
+                                 const std::filesystem::path& file) const;
 
   // Throws InputError "FILE:LINE: path.to.key: problem", or "--set path.to.key=value: path.to.key: problem".
   [[noreturn]] void Fail(const std::string& path, const toml::node& node, const std::string& problem) const;
@@ -44,12 +46,16 @@ class ConfigDocument {
     std::string problem;
   };
 
+  void PutOnBase();
   void Set(const std::string& setting);
+  const std::string& SourceOf(const toml::node& node) const;
   const std::string* SettingOf(const std::string& path) const;
   void FindUnknown(const toml::node& node, const std::string& path, std::vector<UnknownKey>* unknown) const;
 
   std::string name_;
   std::filesystem::path folder_;
+  std::string base_name_;  // empty = there is none
+  std::filesystem::path base_folder_;
   toml::table root_;
   std::map<std::string, std::string> settings_;  // path of a key → the setting that it comes from
   std::mutex mutex_;

@@ -36,12 +36,7 @@ class Renderer {
     if (std::none_of(valid_.data.begin(), valid_.data.end(), [](uint8_t v) { return v != 0; })) {
       throw InputError("camera.mask: no pixel is left");
     }
-    const int count = static_cast<int>(scene.world_from_camera.size());
-    last_ = options.last_frame < 0 ? count : options.last_frame;
-    if (options.first_frame < 0 || options.first_frame >= last_ || last_ > count) {
-      throw InputError("--frames " + std::to_string(options.first_frame) + ":" + std::to_string(last_) +
-                       ": the scene has frames 0:" + std::to_string(count));
-    }
+    ChooseFrames();
   }
 
   RenderResult Run() {
@@ -51,18 +46,30 @@ class Renderer {
     RemoveOldSequence();
     if (!scene_.truth.exact.empty()) CreateFolder(options_.folder / "exact");
     const std::vector<double> gains = Gains();
-    for (int frame = options_.first_frame; frame < last_; ++frame) {
+    for (const int frame : frames_) {
       RenderOne(frame, gains[frame]);
-      progress.Update(double(frame + 1 - options_.first_frame) / (last_ - options_.first_frame));
+      progress.Update(double(++result_.frames) / static_cast<double>(frames_.size()));
     }
     WriteSequence(gains);
-    result_.frames = last_ - options_.first_frame;
     result_.effects = scene_.effects;
     result_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     return result_;
   }
 
  private:
+  void ChooseFrames() {
+    const int count = static_cast<int>(scene_.world_from_camera.size());
+    const int last = options_.last_frame < 0 ? count : options_.last_frame;
+    frames_ = options_.frames;
+    if (frames_.empty()) {
+      for (int frame = options_.first_frame; frame < last; ++frame) frames_.push_back(frame);
+    }
+    if (frames_.empty() || frames_.front() < 0 || frames_.back() >= count) {
+      throw InputError("--frames " + std::to_string(options_.first_frame) + ":" + std::to_string(last) +
+                       ": the scene has frames 0:" + std::to_string(count));
+    }
+  }
+
   bool Wants(const std::string& channel) const {
     return std::find(scene_.truth.exact.begin(), scene_.truth.exact.end(), channel) !=
            scene_.truth.exact.end();
@@ -82,18 +89,30 @@ class Renderer {
   }
 
   std::vector<double> Gains() {
+    const int count = static_cast<int>(scene_.world_from_camera.size());
     if (!scene_.sensor.auto_gain) {
-      std::vector<double> gains(scene_.world_from_camera.size(), scene_.sensor.gain);
-      for (size_t i = 0; scene_.sensor.gain_swing && i < gains.size(); ++i)
-        gains[i] = GainAt(scene_.sensor.gain, *scene_.sensor.gain_swing, static_cast<int>(i));
+      std::vector<double> gains(count, scene_.sensor.gain);
+      for (int i = 0; scene_.sensor.gain_swing && i < count; ++i)
+        gains[i] = GainAt(scene_.sensor.gain, *scene_.sensor.gain_swing, i);
       return gains;
     }
     const Meter meter(scene_, valid_, options_.seed);
-    std::vector<double> brightness;
-    for (int frame = 0; frame < last_; ++frame) {
-      PathCount count;
-      brightness.push_back(meter.Brightness(PathSceneOf(*walls_.At(frame)), frame, &count));
-      NoteFailure(frame, " of the metering picture", count.failure);
+    const auto metered = [&](int frame) {
+      PathCount of_picture;
+      const double brightness = meter.Brightness(PathSceneOf(*walls_.At(frame)), frame, &of_picture);
+      NoteFailure(frame, " of the metering picture", of_picture.failure);
+      return brightness;
+    };
+    std::vector<double> brightness = {metered(0)};
+    // A stretch ends at the same frame whichever frames are asked for.
+    while (static_cast<int>(brightness.size()) <= frames_.back()) {
+      const int from = static_cast<int>(brightness.size()) - 1;
+      const int to = std::min(from + scene_.sensor.auto_gain->metered_every, count - 1);
+      const double at_from = brightness.back(), at_to = metered(to);
+      for (int frame = from + 1; frame <= to; ++frame) {
+        const double t = static_cast<double>(frame - from) / (to - from);
+        brightness.push_back((1 - t) * at_from + t * at_to);
+      }
     }
     return RunAutoGain(*scene_.sensor.auto_gain, scene_.calibration.response, brightness);
   }
@@ -226,7 +245,7 @@ class Renderer {
     sequence.folder = options_.folder;
     sequence.has_toml = true;
     sequence.calibration = scene_.calibration;
-    for (int frame = options_.first_frame; frame < last_; ++frame) {
+    for (const int frame : frames_) {
       SequenceFrame entry;
       entry.number = frame;
       entry.world_from_camera = scene_.world_from_camera[frame];
@@ -277,7 +296,7 @@ class Renderer {
   Photographer photographer_;
   std::vector<uint8_t> seen_;  // of the faces: by any frame so far, with visibility by the last
   std::optional<FaceVisibility> visibility_;  // if it is asked for
-  int last_;
+  std::vector<int> frames_;                   // to render, ascending
   RenderResult result_;
 };
 

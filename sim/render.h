@@ -15,6 +15,7 @@ struct RenderOptions {
   int first_frame = 0;
   int last_frame = -1;  // exclusive; −1 = all
   uint64_t seed = 0;
+  std::vector<int> frames = {};  // to render instead, ascending; empty = those of the range
 };
 
 struct RenderResult {
@@ -28,7 +29,7 @@ struct RenderResult {
   std::vector<std::string> effects;
 };
 
-// Writes the frames [first, last) of the scene, poses, gains and ground truth. Frames, gains included, don't
+// Writes the frames that the options name, poses, gains and ground truth. Frames, gains included, don't
 // depend on which others are rendered. The files of an earlier render in the folder are removed first, its
 // calibration.toml included; a sequence that was not rendered is refused. Throws InputError.
 RenderResult Render(const Scene& scene, const RenderOptions& options);

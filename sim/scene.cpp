@@ -6,9 +6,11 @@
 #include "common/config.h"
 #include "common/error.h"
 #include "common/parallel.h"
+#include "common/progress.h"
 #include "common/random.h"
 #include "sim/geometry/clearance.h"
 #include "sim/geometry/moving_wall.h"
+#include "sim/trajectory/recorded_path.h"
 #include "sim/trajectory/trajectory.h"
 
 namespace lumen {
@@ -142,7 +144,7 @@ const std::vector<std::string>& ExactChannels() {
 }
 
 Scene ReadScene(const std::filesystem::path& file, const std::vector<std::string>& settings, uint64_t seed) {
-  const Config config = Config::Read(file, settings);
+  const Config config = Config::ReadWithBase(file, settings);
   const ConfigTable root = config.root();
   Scene scene;
   const ConfigTable camera = root.Table("camera");
@@ -161,10 +163,16 @@ Scene ReadScene(const std::filesystem::path& file, const std::vector<std::string
   if (const auto sensor = root.Optional("sensor")) scene.sensor = ReadSensor(*sensor);
   if (const auto truth = root.Optional("truth")) scene.truth = ReadTruth(*truth);
   if (const auto table = root.Optional("peristalsis")) scene.peristalsis = ReadPeristalsis(*table);
-  scene.geometry = BuildGeometry(root.Table("geometry"), RandomBits(seed, kGeometrySeed));
-  scene.world_from_camera =
-      BuildTrajectory(root.Table("trajectory"), scene.geometry, RandomBits(seed, kTrajectorySeed));
+  const ConfigTable trajectory = root.Table("trajectory");
+  scene.geometry =
+      BuildGeometry(root.Table("geometry"), RandomBits(seed, kGeometrySeed), GivenPoses(trajectory));
+  scene.world_from_camera = BuildTrajectory(trajectory, scene.geometry, RandomBits(seed, kTrajectorySeed));
+  scene.path_is_stand_in = IsStandIn(trajectory);
   config.RejectUnknown();
+  if (scene.path_is_stand_in) {
+    Say(file.string() + ": " + trajectory.Path("path").string() +
+        " is absent; a stand-in of the same length and motion takes its place");
+  }
   CheckEndoscopeInLumen(scene, file);
   scene.effects = NameEffects(scene);
   return scene;

@@ -28,6 +28,7 @@ struct Scene {
   Geometry geometry;  // at rest
   std::optional<Peristalsis> peristalsis;
   std::vector<Pose> world_from_camera;
+  bool path_is_stand_in = false;  // the recorded poses that the scene names are absent
   Surface surface;
   PathOptions path;
   std::optional<Defocus> defocus;
@@ -37,7 +38,7 @@ struct Scene {
   std::vector<std::string> effects;  // that the scene names, for reports
 };
 
-// Reads a scene file (scenes/README.md) and builds its geometry and trajectory. settings:
+// Reads a scene file (scenes/README.md), with its base, and builds its geometry and trajectory. settings:
 // "path.to.key=value". Throws InputError with file, line and remedy.
 Scene ReadScene(const std::filesystem::path& file, const std::vector<std::string>& settings, uint64_t seed);
 

@@ -182,5 +182,73 @@ TEST(Config, MissingFileIsNamed) {
   EXPECT_EQ(Config::Read(scratch / "x.toml").root().Path("mesh"), scratch / "m.ply");
 }
 
+// A file on its base, in folders of their own.
+class ConfigWithBase : public testing::Test {
+ protected:
+  ConfigWithBase() {
+    std::filesystem::create_directory(scratch_ / "common");
+    WriteFile(scratch_ / "common/base.toml", R"(name = "base"
+[camera]
+width = 10
+mask = "mask.png"
+[[light.source]]
+spread = 1
+[[light.source]]
+spread = 2
+)");
+    WriteFile(scratch_ / "own.toml", R"(base = "common/base.toml"
+[camera]
+width = 20
+[light]
+source = [{spread = 3}]
+[files]
+mesh = "own.ply"
+)");
+  }
+
+  Config Read(const std::vector<std::string>& settings = {}) {
+    return Config::ReadWithBase(scratch_ / "own.toml", settings);
+  }
+
+  test::ScratchFolder scratch_;
+};
+
+TEST_F(ConfigWithBase, JoinsTablesAndReplacesTheRest) {
+  const Config config = Read({"camera.height=5"});
+  const ConfigTable root = config.root();
+  EXPECT_EQ(root.String("name"), "base");
+  EXPECT_EQ(root.Table("camera").Integer("width"), 20);
+  EXPECT_EQ(root.Table("camera").Integer("height"), 5);
+  EXPECT_EQ(root.Table("camera").Path("mask"), scratch_ / "common/mask.png");
+  EXPECT_EQ(root.Table("files").Path("mesh"), scratch_ / "own.ply");
+  const auto sources = root.Table("light").Tables("source");
+  ASSERT_EQ(sources.size(), 1u);
+  EXPECT_EQ(sources[0].Number("spread"), 3);
+  config.RejectUnknown();
+}
+
+TEST_F(ConfigWithBase, ErrorsNameTheFileThatTheKeyStandsIn) {
+  const ConfigTable root = Read().root();
+  const ConfigTable camera = root.Table("camera");
+  const std::string own = (scratch_ / "own.toml").string(), base = (scratch_ / "common/base.toml").string();
+  EXPECT_EQ(ErrorOf([&] { camera.Number("mask"); }),
+            base + ":4: camera.mask: is a string, but must be a number");
+  EXPECT_EQ(ErrorOf([&] {
+              camera.Integer("width", Range{1, 2});
+            }),
+            own + ":3: camera.width: is 20, but must be between 1 and 2");
+  EXPECT_EQ(ErrorOf([&] { root.Table("files").Number("mesh"); }),
+            own + ":7: files.mesh: is a string, but must be a number");
+}
+
+TEST_F(ConfigWithBase, ABaseThatIsMissingOrHasOneItselfIsRefused) {
+  WriteFile(scratch_ / "own.toml", "base = \"none.toml\"\n");
+  EXPECT_EQ(ErrorOf([&] { Read(); }), (scratch_ / "own.toml").string() + ":1: base: there is no file " +
+                                          (scratch_ / "none.toml").string());
+  WriteFile(scratch_ / "none.toml", "\nbase = \"own.toml\"\n");
+  EXPECT_EQ(ErrorOf([&] { Read(); }),
+            (scratch_ / "none.toml").string() + ":2: base: a base has no base of its own; leave it out");
+}
+
 }  // namespace
 }  // namespace lumen

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "common/parallel.h"
+
 namespace lumen {
 
 Clearance::Clearance(const Mesh& mesh) : mesh_(mesh) {
@@ -40,6 +42,19 @@ bool Clearance::Encloses(const Vec3d& place) const {
         2 * std::atan2(a.dot(b.cross(c)), na * nb * nc + a.dot(b) * nc + b.dot(c) * na + c.dot(a) * nb);
   }
   return std::abs(solid_angle) > 2 * kPi;  // ±4π inside, 0 outside
+}
+
+std::vector<double> Clearance::WithinBy(const std::vector<Vec3d>& path) const {
+  std::vector<double> within_mm(path.size());
+  ParallelFor(0, static_cast<int64_t>(path.size()),
+              [&](int64_t i) { within_mm[i] = At(path[i]).distance_mm; });
+  for (size_t i = 0; i < path.size(); ++i) {
+    // No wall lies between a place and another that is nearer to it than the wall.
+    const bool same_side = i > 0 && (path[i] - path[i - 1]).norm() < std::abs(within_mm[i - 1]);
+    const bool inside = same_side ? within_mm[i - 1] > 0 : Encloses(path[i]);
+    if (!inside) within_mm[i] = -within_mm[i];
+  }
+  return within_mm;
 }
 
 double ClearanceKey(const ConfigTable& trajectory) {

@@ -25,6 +25,10 @@ class Clearance {
   // Oosterom and Strackee, 1983), is not 0.
   bool Encloses(const Vec3d& place) const;
 
+  // How far within the closed mesh each of a path's places is, mm; negative outside. Neighbours should lie
+  // close together: then hardly any needs a look at all triangles.
+  std::vector<double> WithinBy(const std::vector<Vec3d>& path) const;
+
  private:
   struct Ball {
     Vec3d centre;

@@ -18,6 +18,7 @@ AutoGain ReadAutoGain(const ConfigTable& table) {
   options.settling_s = table.Number("settling_s", options.settling_s, {1e-3, 1e3});
   options.damping = table.Number("damping", options.damping, {0.05, 10});
   options.frame_rate_hz = table.Number("frame_rate_hz", options.frame_rate_hz, {1e-2, 1e5});
+  options.metered_every = static_cast<int>(table.Integer("metered_every", options.metered_every, {1, 10000}));
   return options;
 }
 

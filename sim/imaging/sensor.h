@@ -22,6 +22,8 @@ struct AutoGain {
   double settling_s = 0.4;  // until within 2% of a step, for damping up to 0.8; above that slower
   double damping = 0.6;
   double frame_rate_hz = 29.97;
+  int metered_every =
+      1;  // frames; brightness is interpolated over those between, so that long videos are quick
 };
 
 // A gain that goes up and down from frame to frame by a known rule: what a calibration is held against.

@@ -7,6 +7,7 @@
 #include "common/error.h"
 #include "common/parallel.h"
 #include "common/pose_file.h"
+#include "sim/trajectory/stand_in.h"
 
 namespace lumen {
 namespace {
@@ -56,6 +57,24 @@ void ShiftFromWall(const Clearance& wall, const Vec3d& axis, double clearance_mm
   }
 }
 
+// All or some of them, as they stand in the file.
+std::vector<Pose> PosesOfFile(const ConfigTable& trajectory) {
+  std::vector<Pose> poses;
+  if (const auto stand_in = trajectory.Optional("stand_in")) {
+    poses = StandInPoses(*stand_in);  // read in any case, so that its mistakes show
+  }
+  if (!IsStandIn(trajectory)) poses = ReadPoses(trajectory.Path("path"));
+  if (!trajectory.Has("frames")) return poses;
+  const int64_t count = trajectory.Integer("frames", Range{1, 100000});
+  if (count > static_cast<int64_t>(poses.size()))
+    trajectory.Fail("frames", "the file has " + std::to_string(poses.size()) + " poses only");
+  return UniformSubset(poses, count);
+}
+
+bool IsAnchored(const ConfigTable& trajectory) {
+  return trajectory.Choice("anchor", "none", {"none", "centreline"}) == "centreline";
+}
+
 Vec3d MeanAxis(const std::vector<Pose>& poses, int column) {
   Vec3d sum = Vec3d::Zero();
   for (const Pose& pose : poses) sum += pose.linear().col(column);
@@ -89,16 +108,21 @@ Pose AnchorOnCentreline(const std::vector<Pose>& poses, const Centreline& centre
   return anchor;
 }
 
+bool IsStandIn(const ConfigTable& trajectory) {
+  std::error_code ignored;
+  return trajectory.Has("stand_in") && !std::filesystem::exists(trajectory.Path("path"), ignored);
+}
+
+std::vector<Pose> GivenPoses(const ConfigTable& trajectory) {
+  const bool from_file = trajectory.Choice("kind", {"withdrawal", "file"}) == "file";
+  if (!from_file || IsAnchored(trajectory)) return {};
+  return PosesOfFile(trajectory);
+}
+
 std::vector<Pose> RecordedPoses(const ConfigTable& trajectory, const Centreline& centreline,
                                 const Clearance& wall) {
-  std::vector<Pose> poses = ReadPoses(trajectory.Path("path"));
-  if (trajectory.Has("frames")) {
-    const int64_t count = trajectory.Integer("frames", Range{1, 100000});
-    if (count > static_cast<int64_t>(poses.size()))
-      trajectory.Fail("frames", "the file has " + std::to_string(poses.size()) + " poses only");
-    poses = UniformSubset(poses, count);
-  }
-  if (trajectory.Choice("anchor", "none", {"none", "centreline"}) == "none") return poses;
+  std::vector<Pose> poses = PosesOfFile(trajectory);
+  if (!IsAnchored(trajectory)) return poses;
   const double at_mm = trajectory.Number("at_mm", Range{0, centreline.length_mm()});
   const double roll_rad = trajectory.Number("roll_rad", 0, Range{-2 * kPi, 2 * kPi});
   const Pose anchor = AnchorOnCentreline(poses, centreline, at_mm, roll_rad);

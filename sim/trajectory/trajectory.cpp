@@ -4,7 +4,6 @@
 #include <cstdio>
 #include <string>
 
-#include "common/parallel.h"
 #include "sim/geometry/centreline.h"
 #include "sim/geometry/clearance.h"
 #include "sim/trajectory/recorded_path.h"
@@ -22,23 +21,20 @@ std::string Millimetres(double value) {
 // The poses as they are, or InputError naming the worst frame.
 void CheckClearance(const ConfigTable& table, const std::vector<Pose>& poses, const Clearance& wall) {
   const double clearance_mm = ClearanceKey(table);
-  std::vector<double> distance(poses.size());
-  std::vector<char> inside(poses.size());
-  ParallelFor(0, poses.size(), [&](int64_t i) {
-    inside[i] = wall.Encloses(poses[i].translation());
-    distance[i] = wall.At(poses[i].translation()).distance_mm;
-  });
-  const auto outside = std::find(inside.begin(), inside.end(), 0);
-  if (outside != inside.end()) {
-    const size_t frame = outside - inside.begin();
+  std::vector<Vec3d> places;
+  for (const Pose& pose : poses) places.push_back(pose.translation());
+  const std::vector<double> within_mm = wall.WithinBy(places);
+  const auto outside = std::find_if(within_mm.begin(), within_mm.end(), [](double mm) { return mm < 0; });
+  if (outside != within_mm.end()) {
+    const size_t frame = outside - within_mm.begin();
     table.Fail("clearance_mm", "frame " + std::to_string(frame) + " is outside the colon, " +
-                                   Millimetres(distance[frame]) + " from its wall: move the trajectory");
+                                   Millimetres(-*outside) + " from its wall: move the trajectory");
   }
-  const size_t worst = std::min_element(distance.begin(), distance.end()) - distance.begin();
-  if (distance[worst] < clearance_mm)
+  const size_t worst = std::min_element(within_mm.begin(), within_mm.end()) - within_mm.begin();
+  if (within_mm[worst] < clearance_mm)
     table.Fail("clearance_mm", "frame " + std::to_string(worst) + " comes within " +
-                                   Millimetres(distance[worst]) + " of the wall, " +
-                                   Millimetres(clearance_mm - distance[worst]) +
+                                   Millimetres(within_mm[worst]) + " of the wall, " +
+                                   Millimetres(clearance_mm - within_mm[worst]) +
                                    " too near: move the trajectory or allow less clearance");
 }
 
