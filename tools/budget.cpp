@@ -8,7 +8,7 @@
 #include "common/files.h"
 #include "common/progress.h"
 #include "tools/options.h"
-#include "tools/scaled_scene.h"
+#include "tools/study/scaled_scene.h"
 #include "tools/study/budget_table.h"
 #include "tools/train_arguments.h"
 

@@ -9,7 +9,7 @@
 #include "sim/cost/render_cost.h"
 #include "tools/cost.h"
 #include "tools/options.h"
-#include "tools/scaled_scene.h"
+#include "tools/study/scaled_scene.h"
 
 namespace lumen {
 namespace {

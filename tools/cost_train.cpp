@@ -9,7 +9,7 @@
 #include "sim/render.h"
 #include "tools/cost.h"
 #include "tools/options.h"
-#include "tools/scaled_scene.h"
+#include "tools/study/scaled_scene.h"
 #include "tools/train_arguments.h"
 
 namespace lumen {

@@ -28,6 +28,7 @@ int main(int argc, char** argv) {
   lumen::AddCalibrate(&app);
   lumen::AddCost(&app);
   lumen::AddBudget(&app);
+  lumen::AddTable(&app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -33,5 +33,6 @@ void AddPhotometry(CLI::App* app);
 void AddCalibrate(CLI::App* app);
 void AddCost(CLI::App* app);
 void AddBudget(CLI::App* app);
+void AddTable(CLI::App* app);
 
 }  // namespace lumen

@@ -1,4 +1,4 @@
-#include "tools/scaled_scene.h"
+#include "tools/study/scaled_scene.h"
 
 #include <algorithm>
 #include <cmath>
