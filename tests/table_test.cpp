@@ -11,7 +11,6 @@
 #include "common/progress.h"
 #include "sim/render.h"
 #include "tests/child_process.h"
-#include "tests/small_sequence.h"
 #include "tests/support.h"
 #include "tools/study/paper_figures.h"
 #include "tools/study/scene_source.h"
@@ -86,15 +85,16 @@ bool Holds(const std::string& text, const std::string& part) { return text.find(
 TEST(TableText, HasTheFiguresThePapersBesideThemAndSaysThatTheDataDiffer) {
   const std::string text = ToText(HandMade());
   EXPECT_TRUE(Holds(text, "NOT the same data")) << text;
-  EXPECT_TRUE(Holds(text,
-                    "cecum_t1_a    C1a |  0.50   1.00   2.00 |  0.95   1.48   2.01 |  1.00   2.00   4.00 "
-                    "|  0.83   1.26   1.72 |    80.0    40.0   50.0      -     12"))
+  EXPECT_TRUE(
+      Holds(text,
+            "cecum_t1_a          C1a |  0.50   1.00   2.00 |  0.95   1.48   2.01 |  1.00   2.00   4.00 "
+            "|  0.83   1.26   1.72 |    80.0    40.0   50.0      -     12"))
       << text;
-  EXPECT_TRUE(Holds(text, "my_own*           |  1.00   2.00   4.00 |     -      -      - |")) << text;
-  EXPECT_TRUE(Holds(text, "failed            |     -      -      - |")) << text;
+  EXPECT_TRUE(Holds(text, "my_own*                 |  1.00   2.00   4.00 |     -      -      - |")) << text;
+  EXPECT_TRUE(Holds(text, "failed                  |     -      -      - |")) << text;
   // Of what has figures; the short one stands apart.
-  EXPECT_TRUE(Holds(text, "mean of 3         |  0.75   1.50   3.00 |  0.95   1.48   2.01 |")) << text;
-  EXPECT_TRUE(Holds(text, "mean of 1 (< 1 cm)|  2.00   4.00   8.00 | 11.00  12.10  14.40 |")) << text;
+  EXPECT_TRUE(Holds(text, "mean of 3               |  0.75   1.50   3.00 |  0.95   1.48   2.01 |")) << text;
+  EXPECT_TRUE(Holds(text, "mean of 1 (< 1 cm)      |  2.00   4.00   8.00 | 11.00  12.10  14.40 |")) << text;
   EXPECT_TRUE(Holds(text, "*: the recorded trajectory is absent")) << text;
 }
 
@@ -261,12 +261,14 @@ TEST(Table, WhatIsMeasuredIsNotMeasuredAgainUnlessSomethingChanged) {
 TEST(Table, AFolderOfSequencesIsTrainedOnAndEvaluatedAsItIs) {
   const ScratchFolder folder;
   SetQuiet(true);
-  fs::copy(test::SmallSequence().folder, folder / "given/one", fs::copy_options::recursive);
-  TableOptions options = SmallOptions(folder / "table");
+  MeasureTable(kOneScene, SmallOptions(folder / "twin"));
+  CreateFolder(folder / "given");
+  fs::rename(folder / "twin/trans_t3_b/sequence", folder / "given/one");
+  const TableOptions options = SmallOptions(folder / "table");
   const Table table = MeasureTable(FindTableSubjects(folder / "given"), options);
   ASSERT_EQ(table.rows.size(), 1u);
   EXPECT_EQ(table.rows[0].data, TableData::kSequence);
-  EXPECT_EQ(table.rows[0].frames, 6);
+  EXPECT_EQ(table.rows[0].frames, 3);
   ASSERT_TRUE(table.rows[0].surveyed);
   EXPECT_LT(table.rows[0].surveyed->mae_mm, 30);
   EXPECT_FALSE(fs::exists(folder / "table/one/sequence"));

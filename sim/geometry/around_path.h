@@ -11,7 +11,7 @@
 namespace lumen {
 
 struct CentrelineRule {
-  double ahead_mm = 65;   // of lumen beyond the deepest camera
+  double ahead_mm = 45;   // of lumen beyond the deepest camera
   double behind_mm = 20;  // and behind the one least deep
   double bend_rad = 0;    // by which the stretch ahead turns, to a side that the seed chooses
   double off_centre_mm =

@@ -115,7 +115,7 @@ std::string Percent(const std::optional<double>& share) {
 }
 
 std::string TextOf(const Line& line, const std::string& mark) {
-  return fmt::format("{:<14}{:<4}|{} |{} |{} |{} |", line.name + mark, line.label, Three(line.surveyed),
+  return fmt::format("{:<20}{:<4}|{} |{} |{} |{} |", line.name + mark, line.label, Three(line.surveyed),
                      Three(line.paper_surveyed), Three(line.extended), Three(line.paper_extended));
 }
 
@@ -184,10 +184,10 @@ nlohmann::json JsonOf(const Line& line) {
 std::string ToText(const Table& table) {
   std::string text;
   for (const std::string& note : Notes(table)) text += note + "\n";
-  text += "\n" + fmt::format("{:<18}|{:^21}|{:^21}|{:^21}|{:^21}|\n", "mm", "surveyed, ours",
+  text += "\n" + fmt::format("{:<24}|{:^21}|{:^21}|{:^21}|{:^21}|\n", "mm", "surveyed, ours",
                              "surveyed, paper's", "extended, ours", "extended, paper's");
   const std::string head = fmt::format("{:>6}{:>7}{:>7} |", "MedAE", "MAE", "RMSE");
-  text += fmt::format("{:<18}|{}{}{}{}{:>8}{:>8}{:>7}{:>7}{:>7}\n", "", head, head, head, head, "path mm",
+  text += fmt::format("{:<24}|{}{}{}{}{:>8}{:>8}{:>7}{:>7}{:>7}\n", "", head, head, head, head, "path mm",
                       "span mm", "seen %", "claims", "s");
   for (const Block& block : BlocksOf(table)) {
     for (size_t i = 0; i < block.rows.size(); ++i) {
