@@ -30,11 +30,15 @@ struct Arguments {
 constexpr double kQuickScale = 1.0 / 3;
 constexpr int kQuickSamples = 1, kQuickPoints = 20'000;
 constexpr int64_t kIterations = 12000, kQuickIterations = 3000;
+// Where the paper's assumptions hold its model of light is exact.
+constexpr const char* kPapersLight = "network.interreflection=\"none\"";
 constexpr const char* kQuickCell = "extract.cell_mm=1.25";
 
 TableOptions OptionsOf(const Arguments& arguments, const CommonOptions& common) {
   TrainArguments train = arguments.train;
+  // In front, so that the command line's own settings count.
   if (arguments.quick) train.settings.insert(train.settings.begin(), kQuickCell);
+  if (arguments.level == "ideal") train.settings.insert(train.settings.begin(), kPapersLight);
   if (train.iterations == 0 && train.seconds == 0) {
     train.iterations = arguments.quick ? kQuickIterations : kIterations;
   }

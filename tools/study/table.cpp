@@ -11,6 +11,7 @@
 #include "common/error.h"
 #include "common/files.h"
 #include "common/progress.h"
+#include "recon/calibration/calibrate.h"
 #include "recon/evaluation/evaluation_json.h"
 #include "recon/training/train.h"
 #include "sim/render.h"
@@ -28,6 +29,7 @@ constexpr double kShort_mm = 10;  // the paper's ("the camera moves less than 1 
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
 // In the record: the seconds that rendering took.
 constexpr char kFramesReady[] = "frames are ready";
+constexpr char kEstimated[] = "gains, their errors, spread, gamma";
 
 class Stopwatch {
  public:
@@ -92,6 +94,16 @@ void TakeNumbers(const std::vector<double>& numbers, bool is_scene, TableRow* ro
   if (is_scene) row->data = numbers[12] != 0 ? TableData::kTwinOfStandIn : TableData::kTwin;
 }
 
+// Which of `count` frames are taken: at most so many, uniformly, as training takes them.
+std::vector<int> UniformFrames(int count, int at_most) {
+  const int taken = std::min(count, at_most);
+  std::vector<int> frames;
+  for (int i = 0; i < taken; ++i) {
+    frames.push_back(taken > 1 ? static_cast<int>(std::lround(double(i) * (count - 1) / (taken - 1))) : 0);
+  }
+  return frames;
+}
+
 // One sequence, from its scene or folder to its figures.
 class SequenceMeasurement {
  public:
@@ -138,8 +150,9 @@ class SequenceMeasurement {
 
   void Run() {
     const Stopwatch watch;
-    const Sequence sequence = subject_.is_scene ? OfScene() : OfFolder();
+    Sequence sequence = subject_.is_scene ? OfScene() : OfFolder();
     DescribePath(all_frames_, &row_);
+    EstimateWhatIsUnknown(&sequence);
     const bool has_surface = Reconstruct(sequence);
     if (has_surface) Evaluate(sequence);
     row_.seconds += watch.Seconds();
@@ -151,6 +164,10 @@ class SequenceMeasurement {
     Sequence sequence = ReadSequence(subject_.path, {.skip_damaged = true});
     for (const std::string& line : sequence.left_out) Say(line);
     all_frames_ = sequence.frames;
+    sequence.frames.clear();
+    for (const int i : UniformFrames(static_cast<int>(all_frames_.size()), options_.train.frames)) {
+      sequence.frames.push_back(all_frames_[i]);
+    }
     if (!record_.Find(kFramesReady)) FramesAreReady(0);
     return sequence;
   }
@@ -166,11 +183,7 @@ class SequenceMeasurement {
     render.folder = folder_ / "sequence";
     render.seed = options_.seed;
     const int count = static_cast<int>(scene.world_from_camera.size());
-    const int taken = std::min(options_.train.frames, count);
-    for (int i = 0; i < taken; ++i) {
-      render.frames.push_back(taken > 1 ? static_cast<int>(std::lround(double(i) * (count - 1) / (taken - 1)))
-                                        : 0);
-    }
+    render.frames = UniformFrames(count, options_.train.frames);
     if (const auto ready = record_.Find(kFramesReady)) {
       row_.seconds += ready->at(0);
     } else {
@@ -194,6 +207,47 @@ class SequenceMeasurement {
   void FramesAreReady(double seconds) {
     fs::remove_all(folder_ / "run");
     record_.Add(kFramesReady, {seconds});
+  }
+
+  // Gains that the sequence doesn't say and, of a folder without sequence.toml, what the data tell of the
+  // light's spread and of γ. Where nothing can be told training learns the gains.
+  void EstimateWhatIsUnknown(Sequence* sequence) {
+    if (std::ranges::all_of(sequence->frames, [](const auto& frame) { return frame.gain.has_value(); }))
+      return;
+    auto estimate = record_.Find(kEstimated);
+    if (!estimate) {
+      estimate = Estimated(*sequence);
+      record_.Add(kEstimated, *estimate);
+    }
+    const size_t count = sequence->frames.size();
+    if (estimate->size() != 2 * count + 2) return;
+    for (size_t i = 0; i < count; ++i) {
+      sequence->frames[i].gain = std::exp((*estimate)[i]);
+      sequence->frames[i].log_gain_error = (*estimate)[count + i];
+    }
+    const double spread = (*estimate)[2 * count], gamma = (*estimate)[2 * count + 1];
+    for (LightSource& source : sequence->calibration.light.sources) {
+      if (!std::isnan(spread)) source.spread = spread;
+    }
+    if (!std::isnan(gamma)) sequence->calibration.response.gamma = gamma;
+  }
+
+  // Logarithms of gains, their standard errors, spread, γ; empty where the frames share too little.
+  std::vector<double> Estimated(const Sequence& sequence) const {
+    CalibrateOptions calibrate;
+    calibrate.light = !sequence.has_toml;
+    try {
+      const SequenceCalibration found = Calibrate(sequence, calibrate, options_.seed);
+      std::vector<double> numbers;
+      for (const Estimate& gain : found.log_gain) numbers.push_back(gain.value);
+      for (const Estimate& gain : found.log_gain) numbers.push_back(gain.standard_error);
+      numbers.push_back(calibrate.light && found.tells_spread ? found.spread.value : kUnknown);
+      numbers.push_back(calibrate.light && found.tells_gamma ? found.gamma.value : kUnknown);
+      return numbers;
+    } catch (const InputError& error) {
+      Say(std::string(error.what()) + "; training learns the gains");
+      return {};
+    }
   }
 
   // False, and said why, where there is no reconstruction.

@@ -58,7 +58,8 @@ struct Table {
 };
 
 // Frames to train on are uniform over the sequence (options.train.frames of them); a scene's others aren't
-// rendered. What is surveyed and covered follows from the poses of all.
+// rendered. Gains that these frames lack are estimated before. What is surveyed and covered follows from the
+// poses of all.
 Table MeasureTable(const std::vector<TableSubject>& subjects, const TableOptions& options);
 
 // The sequence's span is below 1 cm: the paper has means of their own for these.
