@@ -286,7 +286,7 @@ TEST_P(RayLossGradient, MatchesFiniteDifferences) {
     batch.rays.push_back(ray);
     for (int k = 0; k < 12; ++k) batch.distance.push_back(1 + 1.2 * k + 0.3 * Random(state));
   }
-  LossSettings<double> settings{0.9, 1 / 2.2, 0.1, 0.0, 0.1, 0.0, 0.0, 1.0 / 6};
+  LossSettings<double> settings{0.9, 1 / 2.2, 0.1, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0 / 6};
 
   RayLoss<double> ray_loss(&field);
   std::vector<double> unused(field.network_size());
@@ -346,6 +346,59 @@ TEST_P(RayLossGradient, MatchesFiniteDifferences) {
   EXPECT_GT(std::abs(gradient[color_end - 100] - without[color_end - 100]), 1e-6);
   for (size_t i = color_end - 3; i < color_end; ++i) EXPECT_NEAR(gradient[i], without[i], 1e-12);
   EXPECT_NEAR(gradient.back(), without.back(), 1e-12);
+  if (!field.has_ambient()) return;
+  // Channels weighted by trust: the gradient is that of each channel alone times its weight, which the losses
+  // of a channel alone say.
+  settings.albedo_weight = settings.ambient_weight = settings.eikonal_weight = 0;
+  batch.rays.resize(1);
+  batch.distance.resize(batch.samples);
+  const auto gradient_of = [&](double doubt, int only, double* value) {
+    settings.ambient_doubt = doubt;
+    for (int c = 0; c < 3; ++c) {
+      const bool counts = only < 0 || c == only;
+      batch.rays[0].bound[c] = counts ? PixelBound::kExact : PixelBound::kAtLeast;
+      batch.rays[0].observed[c] = counts ? 0.5 : 0;  // at least black: says nothing
+    }
+    std::vector<double> result(field.parameter_count());
+    *value = ray_loss
+                 .Evaluate(parameters.data(), batch, lights, log_gain, settings,
+                           result.data() + field.grid_size(), &unused_gain)
+                 .photometric;
+    return result;
+  };
+  std::vector<double> weighted(field.parameter_count());
+  double trusts = 0, least = 3;
+  for (int c = 0; c < 3; ++c) {
+    double plain, trusted;
+    const std::vector<double> alone = gradient_of(0, c, &plain);
+    gradient_of(500, c, &trusted);
+    trusts += trusted / plain;
+    least = std::min(least, trusted / plain);
+    for (size_t i = 0; i < alone.size(); ++i) weighted[i] += trusted / plain * alone[i];
+  }
+  EXPECT_NEAR(trusts, 3, 1e-9);
+  EXPECT_LT(least, 0.9);
+  double together;
+  const std::vector<double> all = gradient_of(500, -1, &together);
+  for (size_t i = field.grid_size(); i < all.size(); ++i) EXPECT_NEAR(all[i], weighted[i], 1e-12) << i;
+}
+
+TEST(ChannelTrust, IsLessWhereMoreComesFromTheWall) {
+  const Vec3d radiance(2, 1, 0.5);
+  // By hand: parts of .5, .25 and 0 with a doubt of 16 give 1/2, 16/17 and 1, in sum 83/34.
+  const Vec3d trust = ChannelTrust(radiance, Vec3d(1, 0.25, 0), 16.0);
+  EXPECT_NEAR(trust[0], 3 * 34.0 / 83 / 2, 1e-14);
+  EXPECT_NEAR(trust[1], 3 * 34.0 / 83 * 16 / 17, 1e-14);
+  EXPECT_NEAR(trust[2], 3 * 34.0 / 83, 1e-14);
+  // None doubted, none lit by the wall, all alike, all black: each counts one.
+  EXPECT_EQ(ChannelTrust(radiance, Vec3d(1, 0.25, 0), 0.0), Vec3d::Ones());
+  EXPECT_EQ(ChannelTrust<double>(radiance, Vec3d::Zero(), 16), Vec3d::Ones());
+  EXPECT_TRUE(ChannelTrust<double>(radiance, radiance / 3, 16).isApprox(Vec3d::Ones(), 1e-14));
+  EXPECT_EQ(ChannelTrust<double>(Vec3d::Zero(), Vec3d::Zero(), 16), Vec3d::Ones());
+  // The largest doubt, and all light from the wall: still numbers, in float too.
+  const Vec3f edge = ChannelTrust(Vec3f(1, 1, 1), Vec3f(1, 1, 0), 1e6f);
+  EXPECT_NEAR(edge.sum(), 3, 1e-6f);
+  EXPECT_NEAR(edge[2], 3, 1e-5f);
 }
 
 // Moves a frame's camera with its rays and lights.
@@ -396,7 +449,7 @@ TEST(PoseGradient, MatchesFiniteDifferences) {
   for (int row = 0; row < 10; ++row) {
     for (int column = 8; column < 14; ++column) parameters[first + size_t(row) * 14 + column] = 0;
   }
-  LossSettings<double> settings{0.9, 1 / 2.2, 0.0, 0.0, 0.1, 0.0, 0.0, 1.0 / 6};
+  LossSettings<double> settings{0.9, 1 / 2.2, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0 / 6};
   RayLoss<double> ray_loss(&field);
   std::vector<double> unused(field.network_size());
   double motion[kPoseNumbers] = {0.3, 0.1, -0.2, 0.02, -0.03, 0.05}, unused_gain = 0;

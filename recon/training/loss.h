@@ -38,6 +38,23 @@ Term<T> PhotometricLoss(T predicted, T observed, PixelBound bound) {
   return {std::abs(error), error > 0 ? T(1) : error < 0 ? T(-1) : T(0)};
 }
 
+// How much a pixel's channels count beside each other, 3 in sum. What a model says of the light from the rest
+// of the wall is off by a part of that light, which is the larger the paler the wall: a channel counts 1/(1 +
+// doubt · f⁴), f being the part of its radiance that comes from there. Channels with equal parts count 1
+// each, as all do with a doubt of 0. Pixels as a whole keep their weight: to leave out what is far and dark
+// because it is lit by other walls would leave its place to chance. Taken as a constant of the step: its
+// derivative would let the surface move to where its errors count less. 0 ≤ ambient ≤ radiance, a channel
+// each.
+template <class T>
+Vec3<T> ChannelTrust(const Vec3<T>& radiance, const Vec3<T>& ambient, T doubt) {
+  Vec3<T> trust;
+  for (int c = 0; c < 3; ++c) {
+    const T part = radiance[c] > 0 ? ambient[c] / radiance[c] : T(0);
+    trust[c] = 1 / (1 + doubt * part * part * part * part);
+  }
+  return trust * (3 / trust.sum());
+}
+
 // (|g| − 1)² and its gradient by g; 0 at g = 0, which no direction leads away from.
 template <class T>
 T EikonalLoss(const Vec3<T>& gradient, Vec3<T>* slope) {

@@ -159,6 +159,8 @@ void ReadRest(const ConfigTable& root, TrainOptions* options) {
     l.albedo = loss->Number("albedo", l.albedo, kNotNegative);
     l.albedo_final = loss->Number("albedo_final", l.albedo_final, kPositive);
     l.ambient = loss->Number("ambient", l.ambient, kNotNegative);
+    // Its end keeps every trust above 1e-6: their sum stays a number.
+    l.ambient_doubt = loss->Number("ambient_doubt", l.ambient_doubt, {0, 1e6});
     l.albedo_width = loss->Number("albedo_width", l.albedo_width, kPositive);
   }
   if (const auto schedule = root.Optional("schedule")) {
@@ -268,7 +270,8 @@ std::string FormatTrainOptions(const TrainOptions& o) {
       << "\nspread = " << o.sampling.spread << "\nsurface_spacing = " << o.sampling.surface_spacing
       << "\nweight_threshold = " << o.sampling.weight_threshold << "\n\n[loss]\neikonal = " << o.loss.eikonal
       << "\nalbedo = " << o.loss.albedo << "\nalbedo_final = " << o.loss.albedo_final
-      << "\nambient = " << o.loss.ambient << "\nalbedo_width = " << o.loss.albedo_width
+      << "\nambient = " << o.loss.ambient << "\nambient_doubt = " << o.loss.ambient_doubt
+      << "\nalbedo_width = " << o.loss.albedo_width
       << "\n\n[schedule]\niterations = " << o.schedule.iterations << "\nseconds = " << o.schedule.seconds
       << "\nlearning_rate = " << o.schedule.learning_rate
       << "\nlearning_rate_final = " << o.schedule.learning_rate_final << "\ndecay = \""

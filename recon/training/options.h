@@ -54,6 +54,7 @@ struct TrainOptions {
     double albedo_final = 0.02;  // the part of it that is left at the end
     double albedo_width = 0.3;   // of this Huber loss and that of `ambient`
     double ambient = 3;          // the same pull on the log ambient factor, all the time
+    double ambient_doubt = 200;  // of ChannelTrust, recon/training/loss.h
   } loss;
 
   struct Schedule {

@@ -122,20 +122,21 @@ double RayLoss<T>::ComparePixels(const RayBatch<T>& batch, const std::vector<T>&
     const Active& sample = active_[i];
     if (!(sample.weight > 0)) continue;
     radiance_delta_[sample.ray] += sample.weight * shading_[i].radiance;
-    if (!follows_gain) ambient_[sample.ray] += sample.weight * shading_[i].ambient;
+    ambient_[sample.ray] += sample.weight * shading_[i].ambient;
   }
   double loss = 0;
   const T share = settings.per_ray / 3;
   for (size_t r = 0; r < batch.rays.size(); ++r) {
     const auto& ray = batch.rays[r];
     const T exposure = ray.exposure * std::exp(log_gain[ray.frame]);
+    const Vec3<T> trust = ChannelTrust(radiance_delta_[r], ambient_[r], settings.ambient_doubt);
     for (int c = 0; c < 3; ++c) {
       const T linear = exposure * radiance_delta_[r][c];  // so far it holds the radiance itself
       const Term<T> pixel = lit ? Compress(linear, settings.inverse_gamma, ray.floor) : Term<T>{linear, T(1)};
       const Term<T> error = PhotometricLoss(pixel.value, ray.observed[c], ray.bound[c]);
-      loss += share * error.value;
-      const T delta = share * error.slope * pixel.slope;  // ∂loss/∂linear
-      log_gain_gradient[ray.frame] += delta * (linear - exposure * ambient_[r][c]);
+      loss += share * trust[c] * error.value;
+      const T delta = share * trust[c] * error.slope * pixel.slope;  // ∂loss/∂linear
+      log_gain_gradient[ray.frame] += delta * (follows_gain ? linear : linear - exposure * ambient_[r][c]);
       radiance_delta_[r][c] = delta * exposure;
     }
   }

@@ -46,6 +46,7 @@ struct LossSettings {
   T albedo_weight;   // of the pull of the albedo to the batch's mean; kLambertian only
   T albedo_width;    // of its Huber loss, in log
   T ambient_weight;  // of the same pull on the log ambient factor
+  T ambient_doubt;   // of ChannelTrust
   // Samples whose weight and whose influence on any weight are below this are left out; 0 = none.
   T weight_threshold;
   T per_ray;  // 1/number of rays of the whole step
@@ -107,7 +108,7 @@ class RayLoss {
   typename Field<T>::ValuePass value_;
   typename Field<T>::SurfacePass surface_;
   std::vector<T> signed_distance_, transmittance_, weight_, weight_delta_, distance_delta_;  // rays × samples
-  std::vector<Vec3<T>> ambient_;         // a ray: the part of its radiance that doesn't follow the gain
+  std::vector<Vec3<T>> ambient_;         // a ray: the part of its radiance that the rest of the wall sends
   std::vector<Vec3<T>> radiance_delta_;  // a ray
   std::vector<Active> active_;
   std::vector<Shading<T>> shading_;  // an active sample

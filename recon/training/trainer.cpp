@@ -140,6 +140,7 @@ LossSettings<float> Trainer::SettingsAt(double progress) const {
                  : 0.0f;
   settings.albedo_width = static_cast<float>(options_.loss.albedo_width);
   settings.ambient_weight = static_cast<float>(options_.loss.ambient);
+  settings.ambient_doubt = static_cast<float>(options_.loss.ambient_doubt);
   settings.weight_threshold = static_cast<float>(options_.sampling.weight_threshold);
   settings.per_ray = 1.0f / static_cast<float>(options_.sampling.rays);
   return settings;
