@@ -1,9 +1,12 @@
 #include "recon/training/training_frames.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 
 #include "common/error.h"
+#include "common/parallel.h"
+#include "common/random.h"
 #include "recon/training/plausible.h"
 
 namespace lumen {
@@ -23,14 +26,25 @@ double PatternAlong(const Light& light, const Vec3d& ray) {
 
 }  // namespace
 
-TrainingFrames::TrainingFrames(const Sequence& sequence, int count, bool lit)
+std::vector<size_t> SpreadEvenly(size_t available, size_t kept) {
+  kept = std::min(kept, available);
+  std::vector<size_t> places(kept);
+  for (size_t i = 0; i < kept; ++i) {
+    const size_t begin = available * i / kept, end = available * (i + 1) / kept;
+    places[i] = begin + RandomBits(0x7370726561640aull, i) % (end - begin);
+  }
+  return places;
+}
+
+TrainingFrames::TrainingFrames(const Sequence& sequence, int count, bool lit, size_t bytes)
     : calibration_(sequence.calibration), lit_(lit) {
-  const std::vector<size_t> pixels = FindPixels();
+  const int available = static_cast<int>(sequence.frames.size());
+  const int taken = std::min(count, available);
+  const size_t bytes_a_pixel = sizeof(Vec3f) + 2 * sizeof(float) + 3 * static_cast<size_t>(taken);
+  const std::vector<size_t> pixels = FindPixels(std::max<size_t>(1, bytes / bytes_a_pixel));
   if (pixels.empty()) throw InputError(sequence.folder.string() + ": no pixel carries image; check the mask");
   for (int i = 0; i < 256; ++i) decoded_[i] = static_cast<float>(Decode(calibration_.response, i / 255.0));
 
-  const int available = static_cast<int>(sequence.frames.size());
-  const int taken = std::min(count, available);
   for (int i = 0; i < taken; ++i) {
     const int index =
         taken > 1 ? static_cast<int>(std::lround(double(i) * (available - 1) / (taken - 1))) : 0;
@@ -52,8 +66,7 @@ TrainingFrames::TrainingFrames(const Sequence& sequence, int count, bool lit)
   if (lit_) FindScale(sequence);
 }
 
-std::vector<size_t> TrainingFrames::FindPixels() {
-  const Image8 valid = ValidPixels(calibration_);
+std::vector<size_t> TrainingFrames::FindPixels(size_t most) {
   const Camera<double> camera(calibration_.camera);
   const Light& light = calibration_.light;
   // Where the light's pattern is so dark that a wall which saturates the middle is black there, nothing is
@@ -62,21 +75,34 @@ std::vector<size_t> TrainingFrames::FindPixels() {
   for (const LightSource& source : light.sources)
     brightest = std::max(brightest, PatternAlong(light, source.direction));
   const double darkest = lit_ ? brightest * std::pow(kHalfStep, 1 / inverse_gamma()) : 0;
-  std::vector<size_t> pixels;
-  for (int y = 0; y < valid.height; ++y) {
-    for (int x = 0; x < valid.width; ++x) {
-      if (*valid.Pixel(x, y) == 0) continue;
-      const auto ray = camera.Unproject(Vec2d(x, y));
-      if (!ray) continue;
-      const double vignetting = Vignetting(calibration_.response, ray->z());
-      if (vignetting < kHalfStep) continue;  // black whatever is there
-      const double pattern = PatternAlong(light, *ray);
-      if (pattern < darkest) continue;
-      pixels.push_back(size_t(y) * valid.width + x);
-      rays_.push_back(ray->cast<float>());
-      vignetting_.push_back(static_cast<float>(vignetting));
-      pattern_.push_back(static_cast<float>(pattern));
+
+  Image8 valid = ValidPixels(calibration_);
+  const auto unproject = [&](size_t pixel) {
+    return camera.Unproject(Vec2d(double(pixel % valid.width), double(pixel / valid.width)));
+  };
+  std::atomic<size_t> count = 0;
+  ParallelFor(0, valid.height, [&](int64_t y) {
+    size_t of_row = 0;
+    for (size_t pixel = size_t(y) * valid.width; pixel < size_t(y + 1) * valid.width; ++pixel) {
+      if (valid.data[pixel] == 0) continue;
+      const auto ray = unproject(pixel);
+      // Where vignetting leaves less than half a step, a pixel is black whatever is there.
+      const bool tells = ray && Vignetting(calibration_.response, ray->z()) >= kHalfStep &&
+                         PatternAlong(light, *ray) >= darkest;
+      if (!tells) valid.data[pixel] = 0;
+      of_row += tells;
     }
+    count += of_row;
+  });
+  std::vector<size_t> pixels = SpreadEvenly(count, most);  // among those that are left, so far
+  size_t place = 0, kept = 0;
+  for (size_t pixel = 0; kept < pixels.size(); ++pixel) {
+    if (valid.data[pixel] == 0 || place++ != pixels[kept]) continue;
+    pixels[kept++] = pixel;
+    const Vec3d ray = *unproject(pixel);
+    rays_.push_back(ray.cast<float>());
+    vignetting_.push_back(static_cast<float>(Vignetting(calibration_.response, ray.z())));
+    pattern_.push_back(static_cast<float>(PatternAlong(light, ray)));
   }
   return pixels;
 }
