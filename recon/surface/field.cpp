@@ -30,9 +30,11 @@ MlpShape AmbientShape(const FieldOptions& options) {
 constexpr double kSdfStart = 0.02;
 constexpr double kColorStart = 0.1;
 
-// Log of the ambient factor. In a closed cavity that is seen whole it is 0 (the integrating sphere); a lumen
-// is open and unevenly lit.
-constexpr double kAmbientStart = -1;
+// Log of the ambient factor at the start. The mean of what a camera sees is what a place receives in a closed
+// cavity that is seen whole (the integrating sphere); a lumen is open and unevenly lit, so less of it.
+// Radiosity starts with a thirtieth of itself: what the first, wrong surface would send itself holds that
+// surface where it is, and from below the factor finds its level within some hundred steps.
+constexpr double kMeanStart = -1, kRadiosityStart = -3.5;
 
 }  // namespace
 
@@ -63,8 +65,8 @@ void Field<T>::Initialise(uint64_t seed, T* parameters) const {
   if (!has_ambient()) return;
   T* ambient = parameters + grid_size() + sdf_.parameter_count() + color_.parameter_count();
   ambient_.Initialise(seed * 3 + 3, kColorStart, ambient);
-  if (options_.interreflection == Interreflection::kMean)
-    ambient[ambient_.parameter_count() - 1] = static_cast<T>(kAmbientStart);
+  ambient[ambient_.parameter_count() - 1] =
+      static_cast<T>(options_.interreflection == Interreflection::kRadiosity ? kRadiosityStart : kMeanStart);
 }
 
 template <class T>
