@@ -28,7 +28,7 @@ struct Arguments {
 
 // What a quick table's sequences are made with: some 40 s each on two cores.
 constexpr double kQuickScale = 1.0 / 3;
-constexpr int kQuickSamples = 1, kQuickPoints = 20'000;
+constexpr int kQuickSamples = 1, kQuickPoints = 20'000, kQuickViews = 150;
 constexpr int64_t kIterations = 12000, kQuickIterations = 3000;
 // Where the paper's assumptions hold its model of light is exact.
 constexpr const char* kPapersLight = "network.interreflection=\"none\"";
@@ -50,6 +50,7 @@ TableOptions OptionsOf(const Arguments& arguments, const CommonOptions& common) 
   if (arguments.quick) {
     options.samples = kQuickSamples;
     options.completeness_points = kQuickPoints;
+    options.views = kQuickViews;
   }
   options.seed = common.seed;
   options.folder = arguments.folder;

@@ -104,6 +104,12 @@ std::vector<int> UniformFrames(int count, int at_most) {
   return frames;
 }
 
+std::vector<SequenceFrame> Taken(const std::vector<SequenceFrame>& frames, int at_most) {
+  std::vector<SequenceFrame> taken;
+  for (const int i : UniformFrames(static_cast<int>(frames.size()), at_most)) taken.push_back(frames[i]);
+  return taken;
+}
+
 // One sequence, from its scene or folder to its figures.
 class SequenceMeasurement {
  public:
@@ -144,7 +150,8 @@ class SequenceMeasurement {
 
   // And what the reconstruction does besides.
   std::string Key() const {
-    return fmt::format("points = {}\nseed = {}\n", options_.completeness_points, options_.seed) +
+    return fmt::format("points = {}\nviews = {}\nseed = {}\n", options_.completeness_points, options_.views,
+                       options_.seed) +
            FormatTrainOptions(options_.train);
   }
 
@@ -164,10 +171,7 @@ class SequenceMeasurement {
     Sequence sequence = ReadSequence(subject_.path, {.skip_damaged = true});
     for (const std::string& line : sequence.left_out) Say(line);
     all_frames_ = sequence.frames;
-    sequence.frames.clear();
-    for (const int i : UniformFrames(static_cast<int>(all_frames_.size()), options_.train.frames)) {
-      sequence.frames.push_back(all_frames_[i]);
-    }
+    sequence.frames = Taken(all_frames_, options_.train.frames);
     if (!record_.Find(kFramesReady)) FramesAreReady(0);
     return sequence;
   }
@@ -275,7 +279,11 @@ class SequenceMeasurement {
   void Evaluate(const Sequence& sequence) {
     const Mesh reconstruction = ReadMesh(folder_ / "run" / "mesh.ply"), truth = ReadGroundTruth(sequence);
     Sequence all = sequence;
-    all.frames = all_frames_;
+    if (options_.views > 0) {
+      all.frames = Taken(all_frames_, options_.views);
+    } else {
+      all.frames = all_frames_;
+    }
     EvaluateOptions evaluate;
     evaluate.completeness_points = options_.completeness_points;
     evaluate.seed = options_.seed;

@@ -20,6 +20,7 @@ struct TableOptions {
   double scale = 1;                   // of scenes' pictures
   int samples = 0;                    // a pixel; 0 = as the scene says
   int completeness_points = 100'000;
+  int views = 0;  // whose poses say what is seen, uniformly over the sequence; 0 = all
   uint64_t seed = 0;
   // A folder a sequence is made in here, with what was measured: a sequence that was measured with the same
   // options isn't again, one that was stopped goes on from its frames and its checkpoint.
