@@ -216,6 +216,7 @@ TableOptions SmallOptions(const fs::path& folder) {
   options.train = ReadTrainOptions("fast", {"schedule.iterations=60", "sampling.rays=64", "extract.cell_mm=4",
                                             "frames=3", "schedule.checkpoint_seconds=0"});
   options.settings = {"geometry.tolerance_mm=0.3", "trajectory.frames=9", "path.samples=1"};
+  options.level = Level::kIdeal;  // gains are known then
   options.scale = 0.06;
   options.completeness_points = 500;
   options.folder = folder;
@@ -274,6 +275,23 @@ TEST(Table, AFolderOfSequencesIsTrainedOnAndEvaluatedAsItIs) {
   EXPECT_FALSE(fs::exists(folder / "table/one/sequence"));
 }
 
+TEST(Table, GainsThatNobodyRecordedAreEstimatedOrLearnt) {
+  const ScratchFolder folder;
+  SetQuiet(true);
+  TableOptions options = SmallOptions(folder / "table");
+  options.level = Level::kFull;
+  options.calibrate_iterations = 30;
+  const TableRow row = MeasureTable(kOneScene, options).rows.at(0);
+  ASSERT_TRUE(row.surveyed);
+  EXPECT_LT(row.surveyed->mae_mm, 30);
+  const auto runs = nlohmann::json::parse(ReadFile(folder / "table/trans_t3_b/measured.json"))["runs"];
+  const std::string estimated = "gains, their errors, spread, gamma";
+  ASSERT_TRUE(runs.contains(estimated));
+  // Three frames, or none of them where such a run tells nothing.
+  const size_t count = runs[estimated].size();
+  EXPECT_TRUE(count == 0 || count == 2 * 3 + 2) << count;
+}
+
 // Killed again and again at odd moments, it comes to the same table.
 TEST(Table, KilledAndResumedEqualsUninterrupted) {
   const ScratchFolder folder;
@@ -285,6 +303,7 @@ TEST(Table, KilledAndResumedEqualsUninterrupted) {
                                       "0.06",       "--iterations",
                                       "60",         "--frames",
                                       "3",          "--quiet",
+                                      "--level",    "ideal",
                                       "--threads",  "2"};
     for (const char* setting : {"geometry.tolerance_mm=0.3", "trajectory.frames=9"}) {
       words.insert(words.end(), {"--set", setting});

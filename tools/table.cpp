@@ -29,7 +29,7 @@ struct Arguments {
 // What a quick table's sequences are made with: some 40 s each on two cores.
 constexpr double kQuickScale = 1.0 / 3;
 constexpr int kQuickSamples = 1, kQuickPoints = 20'000, kQuickViews = 150;
-constexpr int64_t kIterations = 12000, kQuickIterations = 3000;
+constexpr int64_t kIterations = 12000, kQuickIterations = 3000, kQuickCalibrateIterations = 600;
 // Where the paper's assumptions hold its model of light is exact.
 constexpr const char* kPapersLight = "network.interreflection=\"none\"";
 constexpr const char* kQuickCell = "extract.cell_mm=1.25";
@@ -51,6 +51,7 @@ TableOptions OptionsOf(const Arguments& arguments, const CommonOptions& common) 
     options.samples = kQuickSamples;
     options.completeness_points = kQuickPoints;
     options.views = kQuickViews;
+    options.calibrate_iterations = kQuickCalibrateIterations;
   }
   options.seed = common.seed;
   options.folder = arguments.folder;

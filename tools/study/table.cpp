@@ -240,6 +240,7 @@ class SequenceMeasurement {
   std::vector<double> Estimated(const Sequence& sequence) const {
     CalibrateOptions calibrate;
     calibrate.light = !sequence.has_toml;
+    calibrate.surface.iterations = options_.calibrate_iterations;
     try {
       const SequenceCalibration found = Calibrate(sequence, calibrate, options_.seed);
       std::vector<double> numbers;
