@@ -64,7 +64,10 @@ struct FarEnds<true> {
   struct Arrival {
     Lanes3 toward;  // unit, from the place
     Lanes3 light;   // irradiance of a facing patch
-  } arrivals[2];    // from a guide; on the path, over its density
+  };
+  Arrival from_guide;
+  Arrival from_walls;  // along the path, whose direction was chosen with the coat's density (Coat::Pdf) for
+                       // light that leaves for where the path came from: not over that density
 
   FarEnds Lane(int i) const {
     FarEnds lane;
@@ -72,22 +75,34 @@ struct FarEnds<true> {
     lane.places.albedo = Broadcast(places.albedo[i]);
     lane.places.coat_normal = Broadcast(places.coat_normal[i]);
     lane.places.coat = places.coat;
-    for (int j = 0; j < 2; ++j) {
-      lane.arrivals[j] = Arrival{Broadcast(arrivals[j].toward[i]), Broadcast(arrivals[j].light[i])};
-    }
+    const auto all = [&](const Arrival& arrival) {
+      return Arrival{Broadcast(arrival.toward[i]), Broadcast(arrival.light[i])};
+    };
+    lane.from_guide = all(from_guide);
+    lane.from_walls = all(from_walls);
     return lane;
   }
 
-  // Towards unit directions above the wall.
-  Lanes3 RadianceTo(const Lanes3& direction) const {
+  // What is sent towards unit directions above the wall, and the density with which a path from there would
+  // have gone on as this one did, 1/sr.
+  struct Sent {
+    Lanes3 of_guide, of_walls;
+    Lanes density;
+  };
+  Sent To(const Lanes3& direction) const {
     CoatedLanes seen{places.normal, places.albedo, direction, places.coat_normal, {}};
     seen.reflectance = places.coat->Reflectance(Dot(seen.coat_normal, direction));
-    Lanes3 radiance{};
-    for (const Arrival& arrival : arrivals) {
+    const auto sent = [&](const Arrival& arrival) {
       const CoatLobesLanes lobes = places.coat->Eval(seen, arrival.toward);
-      radiance = radiance + arrival.light * (lobes.base + Lanes3{lobes.glint, lobes.glint, lobes.glint});
-    }
-    return radiance;
+      return arrival.light * (lobes.base + Lanes3{lobes.glint, lobes.glint, lobes.glint});
+    };
+    return {sent(from_guide), sent(from_walls), places.coat->Pdf(seen, from_walls.toward)};
+  }
+
+  // Towards where the paths came from.
+  Lanes3 RadianceTo(const Lanes3& direction) const {
+    const Sent sent = To(direction);
+    return sent.of_guide + Select(sent.density > 0.0f, sent.of_walls * (1.0f / sent.density), Lanes3{});
   }
 };
 
@@ -111,8 +126,8 @@ class BouncePaths {
     const ChosenLight light =
         LightFromOneGuide<kCoat>(wall_, eye, lit, Numbers(start, lit.alive, pairs.Guide(1)), rays);
     if constexpr (kCoat) {
-      ends.arrivals[0] = typename FarEnds<kCoat>::Arrival{light.toward, light.irradiance};
-      ends.arrivals[1] = typename FarEnds<kCoat>::Arrival{light.toward, Lanes3{}};
+      ends.from_guide = {light.toward, light.irradiance};
+      ends.from_walls = {light.toward, Lanes3{}};
     } else {
       ends.radiance = light.sent;
     }
@@ -127,7 +142,7 @@ class BouncePaths {
     for (int bounce = 2; bounce <= options_.bounces && Any(places.alive); ++bounce) {
       const Lanes3 direction = NextDirections(start, pairs, bounce, &places, &throughput, &weight);
       if constexpr (kCoat) {
-        if (bounce == 2) ends->arrivals[1].toward = direction;
+        if (bounce == 2) ends->from_walls.toward = direction;
       }
       HitPacket hits;
       places = Trace(places.alive, OffsetOrigin(places.point, places.normal), direction, &hits, rays);
@@ -139,7 +154,7 @@ class BouncePaths {
       incoming = incoming + Select(places.alive, throughput * light.sent, Lanes3{});
     }
     if constexpr (kCoat) {
-      ends->arrivals[1].light = incoming;
+      ends->from_walls.light = incoming;
     } else {
       ends->radiance = ends->radiance + Lit(*ends).albedo * incoming;
     }
@@ -147,8 +162,8 @@ class BouncePaths {
 
  private:
   // Where paths go on to from places; those that the roulette ends are no longer alive. throughput: what
-  // share of the light that comes along them reaches the ends, whose own lobe is not in it; weight: of what
-  // is seen.
+  // share of the light that comes along them reaches the ends, without the ends' own lobe and, with a coat,
+  // the density of the direction there; weight: of what is seen.
   Lanes3 NextDirections(const BounceStart& start, BouncePairs pairs, int bounce, PlacesOf<kCoat>* places,
                         Lanes3* throughput, Lanes3* weight) const {
     Lanes3 direction{};
@@ -157,24 +172,18 @@ class BouncePaths {
       const Sampler& sampler = *start.samplers[i];
       const Vec2f random = sampler.Pair(pairs.Direction(bounce));
       Vec3f factor = places->albedo[i], toward;  // cosine-distributed: BRDF · cos / density is the albedo
-      float over_density = 1;
       if constexpr (kCoat) {
         const CoatedPlace place = places->lanes()[i];
         // The roulette's second number is free to choose the lobe.
         toward = places->coat->Sample(place, random, sampler.Pair(pairs.Roulette(bounce))[1]);
         const CoatLobes lobes = places->coat->Eval(place, toward);
-        over_density = 1 / places->coat->Pdf(place, toward);
-        factor = (lobes.base + Vec3f::Constant(lobes.glint)) * over_density;
+        factor = (lobes.base + Vec3f::Constant(lobes.glint)) / places->coat->Pdf(place, toward);
       } else {
         toward = lambert::Sample(places->normal[i], random);
       }
       Vec3f seen = (*weight)[i].cwiseProduct(factor);
       Vec3f passed = (*throughput)[i];
-      if (bounce > 2) {
-        passed = passed.cwiseProduct(factor).eval();
-      } else if (kCoat) {
-        passed *= over_density;
-      }
+      if (bounce > 2) passed = passed.cwiseProduct(factor).eval();
       if (bounce > options_.roulette_after) {
         const float survival = std::min(1.0f, std::sqrt(seen.maxCoeff()));
         if (sampler.Pair(pairs.Roulette(bounce))[0] >= survival) places->alive[i] = 0;

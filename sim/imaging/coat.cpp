@@ -201,6 +201,22 @@ float Coat::Pdf(const CoatedPlace& place, const Vec3f& incoming) const {
   return pdf;
 }
 
+Lanes Coat::Pdf(const CoatedLanes& places, const Lanes3& incoming) const {
+  const Lanes zero{};
+  const Lanes cos_out = Dot(places.outgoing, places.coat_normal), cosine = Dot(incoming, places.normal);
+  const Lanes palest = Max(places.albedo.x, Max(places.albedo.y, places.albedo.z));
+  const LanesI mirrors = cos_out > 0.0f;
+  const Lanes share =
+      mirrors ? places.reflectance / (places.reflectance + (1.0f - places.reflectance) * palest) : zero;
+  const Lanes3 half = Normalized(incoming + places.outgoing), across = Cross(half, places.coat_normal);
+  const Lanes along = Dot(half, places.coat_normal), squared = Broadcast(alpha_ * alpha_);
+  const Lanes spread = squared * along * along + Dot(across, across);
+  const Lanes distribution = along > 0.0f ? squared * kInversePi / (spread * spread) : zero;
+  const Lanes slant = Sqrt(squared + (1.0f - squared) * cos_out * cos_out);
+  const Lanes mirrored = mirrors ? distribution / (2.0f * (cos_out + slant)) : zero;
+  return (1.0f - share) * (cosine > 0.0f ? cosine * kInversePi : zero) + share * mirrored;
+}
+
 Vec3f Coat::Mirrored(const CoatedPlace& place, const Vec2f& random) const {
   const TangentFrame frame(place.coat_normal);
   const Vec3f& out = place.outgoing;

@@ -124,6 +124,7 @@ class Coat {
   // What the coat lets by of light that the wall scatters, over that of a wall without one.
   Lanes Transmission(const CoatedLanes& places, const Lanes3& incoming) const;
   float Pdf(const CoatedPlace& place, const Vec3f& incoming) const;
+  Lanes Pdf(const CoatedLanes& places, const Lanes3& incoming) const;
   // choice: in [0, 1), picks the lobe. The direction may be below the wall, where Eval is 0.
   Vec3f Sample(const CoatedPlace& place, const Vec2f& random, float choice) const;
   // A direction for the first lobe alone, and what that lobe sends on over the direction's density: at

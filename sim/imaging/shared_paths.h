@@ -51,7 +51,7 @@ class SharedPaths {
       const BounceStart start = Start(places, *tile, seed, key, sample, p, packets, path.source);
       path.ends = paths_.End(eye, start, kPairs, rays);
       paths_.AddRest(eye, start, kPairs, &path.ends, rays);
-      path.brightness = Brightness(path.ends, start);
+      path.brightness = Brightness(path.ends, start, *tile);
       for (int i = 0; i < kLanes; ++i) {
         if (!path.ends.places.alive[i]) path.brightness[i] = 0;
         if (std::isfinite(path.brightness[i])) {
@@ -90,10 +90,58 @@ class SharedPaths {
     Lanes brightness;
   };
 
-  // What the choice of the joins goes by: of light sent back to where the path started.
-  static Lanes Brightness(const FarEnds<kCoat>& ends, const BounceStart& start) {
-    const Lanes3 light = ends.RadianceTo(start.direction * Broadcast(-1));
+  // What the choice of the joins goes by: light sent back to where the path started.
+  static Lanes Brightness(const FarEnds<false>& ends, const BounceStart& start, const TileSample<false>&) {
+    return LuminanceOf(ends.RadianceTo(start.direction * Broadcast(-1)));
+  }
+  // A coat sends to each place something else: the root mean square of what they would get, shadows apart.
+  static Lanes Brightness(const FarEnds<true>& ends, const BounceStart&, const TileSample<true>& tile) {
+    Lanes brightness{};
+    for (int i = 0; i < kLanes; ++i) {
+      if (!ends.places.alive[i]) continue;
+      const FarEnds<true> end = ends.Lane(i);
+      const Lanes3 point = Broadcast(ends.places.point[i]);
+      Lanes couplings{}, densities{}, squares[3] = {};
+      for (int block = 0; block < kBlocks; ++block) {
+        const auto& seen = tile.places[block];
+        const Lanes coupling = Coupling(seen, point, end.places.normal);
+        if (!Any(coupling > 0.0f)) continue;
+        const auto sent = end.To(Normalized(seen.point - point));
+        const Lanes3 reflected = seen.albedo * coupling;
+        const Lanes of_guide = LuminanceOf(reflected * sent.of_guide);
+        const Lanes of_walls = LuminanceOf(reflected * sent.of_walls);
+        couplings += coupling;
+        densities += coupling * sent.density;
+        squares[0] += of_guide * of_guide;
+        squares[1] += of_guide * of_walls;
+        squares[2] += of_walls * of_walls;
+      }
+      const float to_guide = Inverse(Total(couplings)), to_walls = Inverse(Total(densities));
+      brightness[i] = std::sqrt(Total(squares[0]) * to_guide * to_guide +
+                                2 * Total(squares[1]) * to_guide * to_walls +
+                                Total(squares[2]) * to_walls * to_walls);
+    }
+    return brightness;
+  }
+
+  static Lanes LuminanceOf(const Lanes3& light) {
     return 0.2126f * light.x + 0.7152f * light.y + 0.0722f * light.z;
+  }
+  static float Total(const Lanes& lanes) {
+    float total = 0;
+    for (int i = 0; i < kLanes; ++i) total += lanes[i];
+    return total;
+  }
+  // 0 of 0: what is divided by it is 0 too.
+  static float Inverse(float value) { return value > 0 ? 1 / value : 0; }
+
+  // g/V = cos·cos'/d² between places that are seen and one on the wall; 0 where either faces away.
+  static Lanes Coupling(const PlacesOf<kCoat>& seen, const Lanes3& point, const Lanes3& normal) {
+    const Lanes3 to = point - seen.point;
+    const Lanes squared = Dot(to, to), near = Dot(seen.normal, to), far = -Dot(normal, to);
+    const LanesI faces = seen.alive & (near > 0.0f) & (far > 0.0f);
+    // A quotient at a time: the product of the squares could vanish.
+    return faces ? (near / squared) * (far / squared) : Lanes{};
   }
 
   // The tile's places that are alive.
@@ -140,34 +188,55 @@ class SharedPaths {
     Lanes coupling[kBlocks], sum{};
     for (int block = 0; block < kBlocks; ++block) {
       const auto& seen = tile->places[block];
-      const Lanes3 to = point - seen.point;
-      const Lanes squared = Dot(to, to), near = Dot(seen.normal, to), far = -Dot(normal, to);
-      const LanesI faces = seen.alive & (near > 0.0f) & (far > 0.0f);
-      coupling[block] = Lanes{};
+      coupling[block] = Coupling(seen, point, normal);
+      const LanesI faces = coupling[block] > 0.0f;
       if (!Any(faces)) continue;
       LanesI visible = ~Hidden(from, places.origin[block], faces, rays);
       // The path itself has shown that its start is seen.
       if (source / kLanes == block) visible[source % kLanes] = -1;
-      // A quotient at a time: the product of the squares could vanish.
-      coupling[block] = faces & visible ? (near / squared) * (far / squared) : Lanes{};
+      coupling[block] = visible ? coupling[block] : Lanes{};
       sum += coupling[block];
     }
-    float total = 0;
-    for (int i = 0; i < kLanes; ++i) total += sum[i];
+    const float total = Total(sum);
     // Rounding can turn the path's own start away; then nothing is seen from where it ended.
     if (!(total > 0)) return;
     const FarEnds<kCoat> end = ends.Lane(lane);
+    if constexpr (kCoat) {
+      AddCoated(end, coupling, point, share, total, tile);
+    } else {
+      for (int block = 0; block < kBlocks; ++block) {
+        const auto& seen = tile->places[block];
+        const Lanes3 light = end.RadianceTo(Normalized(seen.point - point));
+        AddLight(block, coupling[block] > 0.0f, seen.albedo * light * (coupling[block] * (share / total)), tile);
+      }
+    }
+  }
+
+  // Beyond an end a path's direction, too, could have been chosen by paths from all the places: under a coat
+  // with another density by each. That density goes into the balance heuristic, so that a glint of the light
+  // from other walls weighs no more towards a place that the path did not come from.
+  static void AddCoated(const FarEnds<true>& end, const Lanes* coupling, const Lanes3& point, float share,
+                        float total, TileSample<true>* tile) {
+    typename FarEnds<true>::Sent sent[kBlocks];
+    Lanes sum{};
+    for (int block = 0; block < kBlocks; ++block) {
+      if (!Any(coupling[block] > 0.0f)) continue;
+      sent[block] = end.To(Normalized(tile->places[block].point - point));
+      sum += coupling[block] * sent[block].density;
+    }
+    const Lanes of_guide = Broadcast(share / total), of_walls = Broadcast(share * Inverse(Total(sum)));
     for (int block = 0; block < kBlocks; ++block) {
       const LanesI joined = coupling[block] > 0.0f;
       if (!Any(joined)) continue;
       const auto& seen = tile->places[block];
-      const Lanes3 direction = Normalized(point - seen.point);
-      Lanes3 light = end.RadianceTo(direction * Broadcast(-1));
-      if constexpr (kCoat) light = light * seen.coat->Transmission(seen.lanes(), direction);
-      tile->indirect[block] =
-          tile->indirect[block] +
-          Select(joined, seen.albedo * light * (coupling[block] * (share / total)), Lanes3{});
+      const Lanes3 light = sent[block].of_guide * of_guide + sent[block].of_walls * of_walls;
+      const Lanes passed = seen.coat->Transmission(seen.lanes(), Normalized(point - seen.point));
+      AddLight(block, joined, seen.albedo * light * (coupling[block] * passed), tile);
     }
+  }
+
+  static void AddLight(int block, const LanesI& joined, const Lanes3& light, TileSample<kCoat>* tile) {
+    tile->indirect[block] = tile->indirect[block] + Select(joined, light, Lanes3{});
   }
 
   LanesI Hidden(const Lanes3& from, const Lanes3& to, const LanesI& asked, int64_t* rays) const {
