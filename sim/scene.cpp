@@ -54,6 +54,8 @@ Image8 ReadMask(const ConfigTable& table, const CameraIntrinsics& camera) {
 PathOptions ReadPath(const ConfigTable& table) {
   PathOptions path;
   path.samples = static_cast<int>(table.Integer("samples", path.samples, {1, 1 << 24}));
+  path.direct_oversampling =
+      static_cast<int>(table.Integer("direct_oversampling", path.direct_oversampling, {1, 1 << 6}));
   path.bounces = static_cast<int>(table.Integer("bounces", path.bounces, {0, 10000}));
   path.roulette_after = static_cast<int>(table.Integer("roulette_after", path.roulette_after, {0, 10000}));
   path.shared_paths = static_cast<int>(table.Integer("shared_paths", path.shared_paths, {0, 4096}));

@@ -310,10 +310,13 @@ TEST(Coat, LanesAndGlintsAreTheLobes) {
         places.reflectance[lane] = coat.Reflectance(places.coat_normal[lane].dot(out));
       }
       const CoatLobesLanes lobes = coat.Eval(places, incoming);
+      const Lanes densities = coat.Pdf(places, incoming);
       for (int lane = 0; lane < kLanes; ++lane) {
         const CoatLobes expected = coat.Eval(places[lane], incoming[lane]);
         EXPECT_LT((lobes.base[lane] - expected.base).norm(), 1e-5f * (1 + expected.base.norm()));
         EXPECT_NEAR(lobes.glint[lane], expected.glint, 1e-3f * expected.glint + 1e-6f);
+        const float density_there = coat.Pdf(places[lane], incoming[lane]);
+        EXPECT_NEAR(densities[lane], density_there, 1e-3f * density_there + 1e-6f);
         const Coat::Glint glint = coat.SampleGlint(places[lane], RandomPair(22, i * kLanes + lane));
         EXPECT_LE(glint.weight, 1);
         if (glint.weight == 0) continue;

@@ -8,6 +8,7 @@
 #include "common/random.h"
 #include "sim/imaging/path.h"
 #include "tests/path_stage.h"
+#include "tests/welch.h"
 
 namespace lumen {
 namespace {
@@ -205,8 +206,71 @@ TEST(CoatedPath, WiderLobeAfterBouncesKeepsTheLight) {
 }
 
 // An index of refraction of 1 reflects nothing: the Lambertian wall's radiance, from the same random numbers.
+// Shared paths take each pixel's light from directions that were chosen for other pixels; a path of its own
+// has none to answer for. Means of 8 × 8 pixels over seeds, Welch's test, one false alarm in 1,000.
+TEST(CoatedPath, SharedPathsAgreeWithOwnOnes) {
+  Stage stage(32, 24, 16);
+  stage.surface.coat.emplace(CoatOptions{1.37, 0.3, 1, 0.06});
+  stage.options.bounces = 4;
+  constexpr int kSeeds = 12, kAcross = 4, kDown = 3;
+  struct Blocks {
+    double mean[kAcross * kDown] = {}, variance[kAcross * kDown] = {};  // of the mean
+  };
+  const auto measure = [&](int shared_paths, int samples, double albedo) {
+    stage.options.shared_paths = shared_paths;
+    stage.options.samples = samples;
+    stage.surface.albedo = Vec3d(0.8, albedo, 0.3);
+    Blocks blocks;
+    double squares[kAcross * kDown] = {};
+    for (int seed = 0; seed < kSeeds; ++seed) {
+      const ImageF light = stage.Render(true, 40 + seed + 100 * shared_paths).indirect;
+      double sums[kAcross * kDown] = {};
+      for (int y = 0; y < 24; ++y) {
+        for (int x = 0; x < 32; ++x) sums[y / 8 * kAcross + x / 8] += light.Pixel(x, y)[1] / 64.0;
+      }
+      for (int i = 0; i < kAcross * kDown; ++i) {
+        blocks.mean[i] += sums[i] / kSeeds;
+        squares[i] += sums[i] * sums[i];
+      }
+    }
+    for (int i = 0; i < kAcross * kDown; ++i) {
+      blocks.variance[i] =
+          (squares[i] - kSeeds * blocks.mean[i] * blocks.mean[i]) / (kSeeds * (kSeeds - 1.0));
+    }
+    return blocks;
+  };
+  const Blocks own = measure(0, 64, 0.5), shared = measure(16, 16, 0.5), paler = measure(16, 16, 0.53);
+  double least_chance = 1;
+  for (int i = 0; i < kAcross * kDown; ++i) {
+    EXPECT_GT(test::WelchChance(shared.mean[i] - own.mean[i], own.variance[i], shared.variance[i], kSeeds),
+              test::SharedOut(1e-3, kAcross * kDown))
+        << i << ": " << shared.mean[i] << " against " << own.mean[i];
+    least_chance = std::min(least_chance, test::WelchChance(paler.mean[i] - own.mean[i], own.variance[i],
+                                                            paler.variance[i], kSeeds));
+  }
+  EXPECT_LT(least_chance, test::SharedOut(1e-3, kAcross * kDown));  // 6% more light between walls is noticed
+}
+
+// More samples of direct light leave the light between walls as it was, and have the direct light's mean.
+TEST(CoatedPath, DirectLightMayHaveMoreSamples) {
+  Stage stage(24, 18, 12);
+  stage.surface.coat.emplace(CoatOptions{});
+  stage.options.samples = 2;
+  stage.options.bounces = 2;
+  const Film few = stage.Render();
+  stage.options.direct_oversampling = 8;
+  const Film more = stage.Render();
+  EXPECT_EQ(more.indirect.data, few.indirect.data);
+  stage.options = {16, 0};
+  const Film many = stage.Render();
+  EXPECT_EQ(more.direct.data, many.direct.data);
+  EXPECT_EQ(more.glint.data, many.glint.data);
+}
+
+// By paths of the pixels' own: shared ones are chosen otherwise under a coat.
 TEST(CoatedPath, CoatOfAirIsNone) {
   Stage stage(16, 12, 8);
+  stage.options.shared_paths = 0;
   stage.options.samples = 4;
   stage.options.bounces = 4;
   const Film bare = stage.Render();

@@ -9,6 +9,7 @@
 #include "common/parallel.h"
 #include "sim/imaging/bounce_paths.h"
 #include "sim/imaging/eye.h"
+#include "sim/imaging/glint_paths.h"
 #include "sim/imaging/guide_light.h"
 #include "sim/imaging/pixel_samples.h"
 #include "sim/imaging/places.h"
@@ -48,6 +49,7 @@ class Tracer {
       : scene_(scene),
         view_(view),
         options_(options),
+        direct_samples_(options.samples * options.direct_oversampling),
         seed_(seed),
         frame_(static_cast<uint64_t>(frame)),
         finder_(scene),
@@ -113,7 +115,7 @@ class Tracer {
 
   void TraceDirect(const TilePixels& pixels, Film* film, PathCount* count) const {
     // What moves is where it is at one moment for all of a packet.
-    const int each = view_.motion ? 1 : PixelSamples::EachOf(options_.samples);
+    const int each = view_.motion ? 1 : PixelSamples::EachOf(direct_samples_);
     for (int block = 0; block < kBlocks; ++block) {
       if (!Any(pixels.on[block])) continue;
       for (int group = 0; group < each; ++group) {
@@ -130,7 +132,7 @@ class Tracer {
     if (!Any(packet.on)) return;
     double sums[kCoat ? 2 : 1][3][kLanes] = {};  // by lobe
     int lost[kLanes] = {};
-    for (int first = 0; first < options_.samples; first += each) {
+    for (int first = 0; first < direct_samples_; first += each) {
       LobesOf<kCoat> light{};
       if (view_.motion) {
         AddDirectOfPacket(EyeOf(pixels, block, first), packet, &light, count);
@@ -155,7 +157,7 @@ class Tracer {
     const int group_pixels = kLanes / each;
     for (int i = 0; i < group_pixels; ++i) {
       if (!packet.on[i]) continue;
-      int kept = options_.samples;
+      int kept = direct_samples_;
       for (int k = i; k < kLanes; k += group_pixels) kept -= lost[k];
       if (kept == 0) continue;
       const int x = pixels.X(block, packet.pixel[i]), y = pixels.Y(block, packet.pixel[i]);
@@ -202,16 +204,22 @@ class Tracer {
 
   void TraceIndirect(const TilePixels& pixels, uint64_t key, int sample, PathCount* count) {
     TileSample<kCoat> tile;
+    std::optional<GlintPaths> glints;
+    if constexpr (kCoat) glints.emplace(own_paths_, kGlintPairs, walks_ ? tile.mirrored : tile.indirect);
     for (int block = 0; block < kBlocks; ++block) {
       tile.places[block].alive = LanesI{};
       tile.indirect[block] = Lanes3{};
+      if constexpr (kCoat) tile.mirrored[block] = Lanes3{};
       if (!Any(pixels.on[block])) continue;
       if (view_.motion) {
-        TraceIndirectBlock(EyeOf(pixels, block, sample), pixels, block, sample, &tile, count);
+        const Eye eye = EyeOf(pixels, block, sample);
+        TraceIndirectBlock(eye, pixels, block, sample, &tile, &glints, count);
+        if (glints) glints->Trace(eye, &count->rays);  // what moves has another eye in the next block
       } else {
-        TraceIndirectBlock(eye_, pixels, block, sample, &tile, count);
+        TraceIndirectBlock(eye_, pixels, block, sample, &tile, &glints, count);
       }
     }
+    if (glints) glints->Trace(eye_, &count->rays);
     if (options_.shared_paths > 0) {
       const auto lost = [&](const auto& path) {
         Note({1, pixels.X(path.block, path.lane), pixels.Y(path.block, path.lane), sample}, &count->failure);
@@ -225,23 +233,21 @@ class Tracer {
   }
 
   void TraceIndirectBlock(const Eye& eye, const TilePixels& pixels, int block, int sample,
-                          TileSample<kCoat>* tile, PathCount* count) const {
+                          TileSample<kCoat>* tile, std::optional<GlintPaths>* glints,
+                          PathCount* count) const {
     HitPacket hits;
     PixelSamples packet = SamplesOf(pixels, block, 1, 0);
     packet.sample += static_cast<uint32_t>(sample);
     tile->places[block] = Look(eye, packet, &hits, count);
-    if (walks_) {
-      // The coat mirrors its light where the pixels look, before the places are those where light comes in.
-      if constexpr (kCoat) {
-        AddGlintPaths(eye, packet, block, tile, count);
-        tile->mirrored[block] = std::exchange(tile->indirect[block], Lanes3{});
-      }
-      tile->places[block] = Entries(hits, tile->places[block], packet, count);
-    }
-    if (options_.shared_paths == 0) AddOwnPaths(eye, packet, block, tile, count);
+    // The coat mirrors its light where the pixels look, not where light enters the tissue.
     if constexpr (kCoat) {
-      if (!walks_) AddGlintPaths(eye, packet, block, tile, count);
+      const auto sampler = [&](int i) {
+        return Sampler(seed_, packet.key[i], packet.sample[i], options_.sampler);
+      };
+      (*glints)->Start(eye, block, tile->places[block], sampler, &count->rays);
     }
+    if (walks_) tile->places[block] = Entries(hits, tile->places[block], packet, count);
+    if (options_.shared_paths == 0) AddOwnPaths(eye, packet, block, tile, count);
   }
 
   // Adds a block's sample of indirect light to the frame's sums, but for pixels where it is not finite.
@@ -309,7 +315,7 @@ class Tracer {
   // The places that are seen.
   PlacesOf<kCoat> Look(const Eye& eye, const PixelSamples& packet, HitPacket* hits, PathCount* count) const {
     Lanes x = packet.x, y = packet.y;
-    if (options_.samples > 1) {
+    if (direct_samples_ > 1) {
       Lanes u, v;
       packet.sampler.Pair(packet.sample, kPixelPair, &u, &v);
       x += u - 0.5f;
@@ -388,37 +394,10 @@ class Tracer {
     tile->indirect[block] = tile->indirect[block] + Select(ends.places.alive, light, Lanes3{});
   }
 
-  // Light that the coat mirrors: its lobe is too narrow for paths that come to it from elsewhere, and sends
-  // on so little that only some of the pixels look.
-  void AddGlintPaths(const Eye& eye, const PixelSamples& packet, int block, TileSample<true>* tile,
-                     PathCount* count) const {
-    constexpr BouncePairs kPairs(kGlintPairs);
-    const CoatedPlaces& places = tile->places[block];
-    BounceStart start;
-    start.origin = OffsetOrigin(places.point, places.normal);
-    for (int i = 0; i < kLanes; ++i) {
-      if (!places.alive[i]) continue;
-      const Sampler& sampler =
-          start.samplers[i].emplace(seed_, packet.key[i], packet.sample[i], options_.sampler);
-      const Coat::Glint glint =
-          places.coat->SampleGlint(places.lanes()[i], sampler.Pair(kPairs.Direction(1)));
-      // Roulette: the light of those that look is as bright as its weight's root.
-      const float survival = std::sqrt(glint.weight);
-      if (!(sampler.Pair(kPairs.Roulette(1))[0] < survival)) continue;
-      start.on[i] = -1;
-      start.direction.Set(i, glint.incoming);
-      start.weight.Set(i, Vec3f::Constant(glint.weight / survival));
-    }
-    if (!Any(start.on)) return;
-    FarEnds<kCoat> ends = own_paths_.End(eye, start, kPairs, &count->rays);
-    own_paths_.AddRest(eye, start, kPairs, &ends, &count->rays);
-    const Lanes3 light = start.weight * ends.RadianceTo(start.direction * Broadcast(-1));
-    tile->indirect[block] = tile->indirect[block] + Select(ends.places.alive, light, Lanes3{});
-  }
-
   const PathScene scene_;
   const View view_;
   const PathOptions options_;
+  const int direct_samples_;
   const uint64_t seed_, frame_;
   const PlaceFinder<kCoat> finder_;
   const BouncePaths<kCoat> own_paths_;

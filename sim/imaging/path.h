@@ -23,6 +23,7 @@ struct PathOptions {
   int roulette_after = 8;  // bounces that every path may make before Russian roulette
   int shared_paths = 16;   // that a tile's pixels share for each sample; 0 = a path for each pixel of its own
   Sampling sampler = Sampling::kSobol;
+  int direct_oversampling = 1;  // samples of direct light for each of light between walls: they cost less
 };
 
 // What there is to see. All of it is referred to.

@@ -79,7 +79,7 @@ class SharedPaths {
   }
 
  private:
-  static constexpr int kPathsPerJoin = 4;               // least time to a given noise, of 1 to 8
+  static constexpr int kPathsPerJoin = kCoat ? 8 : 4;   // least time to a given noise, of 1 to 8
   static constexpr uint64_t kTileNumbers = 1ull << 38;  // apart from its paths'
   static constexpr uint32_t kSourcePair = 0;
   static constexpr BouncePairs kPairs{1};
@@ -117,9 +117,9 @@ class SharedPaths {
         squares[2] += of_walls * of_walls;
       }
       const float to_guide = Inverse(Total(couplings)), to_walls = Inverse(Total(densities));
-      brightness[i] = std::sqrt(Total(squares[0]) * to_guide * to_guide +
-                                2 * Total(squares[1]) * to_guide * to_walls +
-                                Total(squares[2]) * to_walls * to_walls);
+      brightness[i] =
+          std::sqrt(Total(squares[0]) * to_guide * to_guide + 2 * Total(squares[1]) * to_guide * to_walls +
+                    Total(squares[2]) * to_walls * to_walls);
     }
     return brightness;
   }
@@ -207,7 +207,8 @@ class SharedPaths {
       for (int block = 0; block < kBlocks; ++block) {
         const auto& seen = tile->places[block];
         const Lanes3 light = end.RadianceTo(Normalized(seen.point - point));
-        AddLight(block, coupling[block] > 0.0f, seen.albedo * light * (coupling[block] * (share / total)), tile);
+        AddLight(block, coupling[block] > 0.0f, seen.albedo * light * (coupling[block] * (share / total)),
+                 tile);
       }
     }
   }
