@@ -226,16 +226,6 @@ TableOptions SmallOptions(const fs::path& folder) {
 const std::vector<TableSubject> kOneScene = {
     {"trans_t3_b", LUMEN_SOURCE_FOLDER "/scenes/c3vd_twin/trans_t3_b.toml", true}};
 
-void ExpectSame(const TableRow& a, const TableRow& b) {
-  ASSERT_TRUE(a.surveyed && b.surveyed && a.extended && b.extended);
-  EXPECT_EQ(a.surveyed->mae_mm, b.surveyed->mae_mm);
-  EXPECT_EQ(a.surveyed->rmse_mm, b.surveyed->rmse_mm);
-  EXPECT_EQ(a.extended->medae_mm, b.extended->medae_mm);
-  EXPECT_EQ(a.truth_share, b.truth_share);
-  EXPECT_EQ(a.path_mm, b.path_mm);
-  EXPECT_EQ(a.frames, b.frames);
-}
-
 TEST(Table, WhatIsMeasuredIsNotMeasuredAgainUnlessSomethingChanged) {
   const ScratchFolder folder;
   SetQuiet(true);

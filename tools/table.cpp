@@ -28,8 +28,8 @@ struct Arguments {
 
 // What a quick table's sequences are made with: some 40 s each on two cores.
 constexpr double kQuickScale = 1.0 / 3;
-constexpr int kQuickSamples = 1, kQuickPoints = 20'000, kQuickViews = 150;
-constexpr int64_t kIterations = 12000, kQuickIterations = 3000, kQuickCalibrateIterations = 600;
+constexpr int kQuickPoints = 20'000, kQuickViews = 150;
+constexpr int64_t kIterations = 8000, kQuickIterations = 3000, kQuickCalibrateIterations = 600;
 // Where the paper's assumptions hold its model of light is exact.
 constexpr const char* kPapersLight = "network.interreflection=\"none\"";
 constexpr const char* kQuickCell = "extract.cell_mm=1.25";
@@ -48,7 +48,6 @@ TableOptions OptionsOf(const Arguments& arguments, const CommonOptions& common) 
   options.settings = arguments.settings;
   options.scale = arguments.scale > 0 ? arguments.scale : arguments.quick ? kQuickScale : 1;
   if (arguments.quick) {
-    options.samples = kQuickSamples;
     options.completeness_points = kQuickPoints;
     options.views = kQuickViews;
     options.calibrate_iterations = kQuickCalibrateIterations;

@@ -44,7 +44,7 @@ struct FieldOptions {
   int features = 15;  // numbers that the distance network hands to the colour network
   double unit_mm = 68;
   Reflectance reflectance = Reflectance::kLambertian;
-  Interreflection interreflection = Interreflection::kMean;  // of a kLambertian wall; others have none
+  Interreflection interreflection = Interreflection::kRadiosity;  // of a kLambertian wall; others: none
   std::vector<int> ambient_hidden = {16};
 };
 

@@ -14,8 +14,12 @@ struct Preset {
   std::vector<const char*> texts;  // what differs from the defaults of TrainOptions, a later one on top
 };
 
-// The baseline: pixels as they are, and no light.
+// The baseline: pixels as they are, and no light. Without light the surface hardly leaves the tube that it
+// starts from, so that one is as wide as a colon.
 constexpr const char* kUnlit = R"(
+[initial]
+radius_mm = 24
+fit_reach = false
 [network]
 reflectance = "unlit"
 [loss]
@@ -128,7 +132,9 @@ void ReadField(const ConfigTable& root, FieldOptions* field) {
   if (const auto initial = root.Optional("initial")) {
     ReadChoice(*initial, "shape", kShapeNames, &field->initial.shape);
     field->initial.radius_mm = initial->Number("radius_mm", field->initial.radius_mm, kPositive);
+    if (initial->Has("reach_mm")) field->initial.fit_reach = false;
     field->initial.reach_mm = initial->Number("reach_mm", field->initial.reach_mm, kNotNegative);
+    field->initial.fit_reach = initial->Flag("fit_reach", field->initial.fit_reach);
   }
 }
 
@@ -261,9 +267,11 @@ std::string FormatTrainOptions(const TrainOptions& o) {
       << kInterreflectionNames[int(o.field.interreflection)]
       << "\"\nambient_hidden = " << Array(o.field.ambient_hidden) << "\n\n[initial]\nshape = \""
       << kShapeNames[int(o.field.initial.shape)] << "\"\nradius_mm = " << o.field.initial.radius_mm
-      << "\nreach_mm = " << o.field.initial.reach_mm << "\n\n[bounds]\nahead_mm = " << o.bounds.ahead_mm
-      << "\naside_mm = " << o.bounds.aside_mm << "\n\n[sampling]\nrays = " << o.sampling.rays
-      << "\nsampler = \"" << kSamplerNames[int(o.sampling.kind)] << "\"\nuniform = " << o.sampling.uniform
+      << "\nreach_mm = " << o.field.initial.reach_mm
+      << "\nfit_reach = " << (o.field.initial.fit_reach ? "true" : "false")
+      << "\n\n[bounds]\nahead_mm = " << o.bounds.ahead_mm << "\naside_mm = " << o.bounds.aside_mm
+      << "\n\n[sampling]\nrays = " << o.sampling.rays << "\nsampler = \""
+      << kSamplerNames[int(o.sampling.kind)] << "\"\nuniform = " << o.sampling.uniform
       << "\nrounds = " << o.sampling.rounds << "\nround = " << o.sampling.round
       << "\nround_sharpness_per_mm = " << o.sampling.round_sharpness_per_mm
       << "\ncoarse = " << o.sampling.coarse << "\nsurface = " << o.sampling.surface

@@ -5,6 +5,7 @@
 
 #include "common/parallel.h"
 #include "common/random.h"
+#include "recon/training/initial_reach.h"
 #include "recon/training/march.h"
 #include "recon/training/surroundings.h"
 
@@ -44,7 +45,12 @@ Trainer::Trainer(const TrainingFrames& frames, const TrainOptions& options, uint
   const Eigen::AlignedBox3d bounds = SceneBounds(frames.world_from_camera(), options.bounds);
   origin_ = bounds.center();
   const Vec3d half = bounds.sizes() / 2;
-  const InitialSurface initial(options.field.initial, frames.world_from_camera(), origin_);
+  InitialSurfaceOptions start = options.field.initial;
+  if (start.fit_reach && start.shape == InitialShape::kTube &&
+      options.field.reflectance != Reflectance::kUnlit) {
+    start.reach_mm = FitReach(frames, start, options.bounds.ahead_mm, RandomBits(seed, 0x7265616368ull));
+  }
+  const InitialSurface initial(start, frames.world_from_camera(), origin_);
   field_ = std::make_unique<Field<float>>(options.field, initial, Eigen::AlignedBox3d(-half, half));
   for (const Pose& pose : frames.world_from_camera()) {
     lights_.push_back(LightOfFrame<float>(frames.light(), pose, origin_));

@@ -142,8 +142,8 @@ class SequenceMeasurement {
   std::string Source() const {
     if (!subject_.is_scene) return SequenceSource(subject_.path);
     std::string source =
-        fmt::format("level = {}\nscale = {}\nsamples = {}\nframes = {}\nseed = {}\n", NameOf(options_.level),
-                    options_.scale, options_.samples, options_.train.frames, options_.seed);
+        fmt::format("level = {}\nscale = {}\nframes = {}\nseed = {}\n", NameOf(options_.level), options_.scale,
+                    options_.train.frames, options_.seed);
     for (const std::string& setting : options_.settings) source += setting + "\n";
     return source + SceneSource(subject_.path);
   }
@@ -180,7 +180,6 @@ class SequenceMeasurement {
   Sequence OfScene() {
     Scene scene = ReadScaledScene(subject_.path, options_.settings, options_.seed, options_.scale);
     ApplyLevel(options_.level, &scene);
-    if (options_.samples > 0) scene.path.samples = options_.samples;
     scene.truth = {false, {}};  // evaluation takes the mesh
     if (scene.path_is_stand_in) row_.data = TableData::kTwinOfStandIn;
     RenderOptions render;

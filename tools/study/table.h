@@ -18,7 +18,6 @@ struct TableOptions {
   Level level = Level::kFull;         // of scenes
   std::vector<std::string> settings;  // of scenes: "path.to.key=value"
   double scale = 1;                   // of scenes' pictures
-  int samples = 0;                    // a pixel; 0 = as the scene says
   // Of the run that gains nobody recorded are estimated from (recon/calibration/calibrate.h).
   int64_t calibrate_iterations = 1500;
   int completeness_points = 100'000;
