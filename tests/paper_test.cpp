@@ -134,7 +134,7 @@ TEST(Product, OuterProductsAreEigens) {
 // NeuS's start is a sphere in expectation over the weights; 256 numbers a layer are some tenths off in the
 // gradient. Softplus is above 0 at 0, by log 2/100 in every number of every layer, which lowers the top.
 TEST(Paper, NetworkStartsAsASphereAroundTheCameras) {
-  const TrainOptions options = ReadTrainOptions("paper", {"initial.shape=sphere"});
+  const TrainOptions options = ReadTrainOptions("paper", {"initial.shape=sphere", "initial.radius_mm=24"});
   Pose pose = Pose::Identity();
   pose.translation() = Vec3d(0, 0, 10);
   const InitialSurface initial(options.field.initial, {pose}, Vec3d::Zero());

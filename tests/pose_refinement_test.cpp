@@ -89,7 +89,7 @@ TEST(PoseRefinement, PosesComeNearerToTheTruth) {
   const TrainingFrames frames(sequence, options.frames, true);
   Trainer trainer(frames, options, 1);
   const PoseError before = ErrorOf(trainer.Poses(), truth);
-  constexpr int kSteps = 900;
+  constexpr int kSteps = 1500;
   for (int step = 0; step < kSteps; ++step) trainer.Step(double(step) / kSteps);
   const PoseError after = ErrorOf(trainer.Poses(), truth);
   RecordProperty("shift_mm", std::to_string(before.shift_mm) + " to " + std::to_string(after.shift_mm));

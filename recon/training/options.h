@@ -78,7 +78,7 @@ struct TrainOptions {
     // Adam's, from `start` (a part of the run) on; from the middle of the run they fall to 0.
     double translation_rate_mm = 2e-3;
     double rotation_rate_rad = 5e-5;
-    double start = 0.05;
+    double start = 0.2;  // earlier the surface is too far off to tell
   } poses;
 
   double extract_cell_mm = 0.75;

@@ -142,8 +142,8 @@ class SequenceMeasurement {
   std::string Source() const {
     if (!subject_.is_scene) return SequenceSource(subject_.path);
     std::string source =
-        fmt::format("level = {}\nscale = {}\nframes = {}\nseed = {}\n", NameOf(options_.level), options_.scale,
-                    options_.train.frames, options_.seed);
+        fmt::format("level = {}\nscale = {}\nframes = {}\nseed = {}\n", NameOf(options_.level),
+                    options_.scale, options_.train.frames, options_.seed);
     for (const std::string& setting : options_.settings) source += setting + "\n";
     return source + SceneSource(subject_.path);
   }
