@@ -105,13 +105,15 @@ class SharedPaths {
       for (int block = 0; block < kBlocks; ++block) {
         const auto& seen = tile.places[block];
         const Lanes coupling = Coupling(seen, point, end.places.normal);
-        if (!Any(coupling > 0.0f)) continue;
+        // A place that is the end itself has no direction: it isn't joined, whatever is sent there.
+        const LanesI joined = coupling > 0.0f;
+        if (!Any(joined)) continue;
         const auto sent = end.To(Normalized(seen.point - point));
         const Lanes3 reflected = seen.albedo * coupling;
-        const Lanes of_guide = LuminanceOf(reflected * sent.of_guide);
-        const Lanes of_walls = LuminanceOf(reflected * sent.of_walls);
+        const Lanes of_guide = joined ? LuminanceOf(reflected * sent.of_guide) : Lanes{};
+        const Lanes of_walls = joined ? LuminanceOf(reflected * sent.of_walls) : Lanes{};
         couplings += coupling;
-        densities += coupling * sent.density;
+        densities += joined ? coupling * sent.density : Lanes{};
         squares[0] += of_guide * of_guide;
         squares[1] += of_guide * of_walls;
         squares[2] += of_walls * of_walls;
@@ -221,9 +223,10 @@ class SharedPaths {
     typename FarEnds<true>::Sent sent[kBlocks];
     Lanes sum{};
     for (int block = 0; block < kBlocks; ++block) {
-      if (!Any(coupling[block] > 0.0f)) continue;
+      const LanesI joined = coupling[block] > 0.0f;
+      if (!Any(joined)) continue;
       sent[block] = end.To(Normalized(tile->places[block].point - point));
-      sum += coupling[block] * sent[block].density;
+      sum += joined ? coupling[block] * sent[block].density : Lanes{};
     }
     const Lanes of_guide = Broadcast(share / total), of_walls = Broadcast(share * Inverse(Total(sum)));
     for (int block = 0; block < kBlocks; ++block) {
