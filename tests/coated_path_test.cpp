@@ -205,7 +205,6 @@ TEST(CoatedPath, WiderLobeAfterBouncesKeepsTheLight) {
   EXPECT_LT(wide_glints.variance, (1 - by_chance) * glints.variance);
 }
 
-// An index of refraction of 1 reflects nothing: the Lambertian wall's radiance, from the same random numbers.
 // Shared paths take each pixel's light from directions that were chosen for other pixels; a path of its own
 // has none to answer for. Means of 8 × 8 pixels over seeds, Welch's test, one false alarm in 1,000.
 TEST(CoatedPath, SharedPathsAgreeWithOwnOnes) {
@@ -267,6 +266,7 @@ TEST(CoatedPath, DirectLightMayHaveMoreSamples) {
   EXPECT_EQ(more.glint.data, many.glint.data);
 }
 
+// An index of refraction of 1 reflects nothing: the Lambertian wall's radiance, from the same random numbers.
 // By paths of the pixels' own: shared ones are chosen otherwise under a coat.
 TEST(CoatedPath, CoatOfAirIsNone) {
   Stage stage(16, 12, 8);

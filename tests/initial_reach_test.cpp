@@ -77,7 +77,8 @@ InitialSurfaceOptions Tube() {
 }
 
 // The tube that is tried is the capsule itself, so the nearest of the reaches tried, which lie 15% apart, is
-// within half of that in the logarithm.
+// within half of that in the logarithm. Reaches of less than half a radius beyond the path add no segment,
+// and are left out.
 TEST(InitialReach, IsTheCapsulesThatTheFramesShow) {
   for (const double reach : {18.0, 35.0, 75.0}) {
     for (const bool gains_known : {true, false}) {

@@ -26,7 +26,7 @@ struct Arguments {
   bool quick = false;
 };
 
-// What a quick table's sequences are made with: some 40 s each on two cores.
+// What a quick table's sequences are made with.
 constexpr double kQuickScale = 1.0 / 3;
 constexpr int kQuickPoints = 20'000, kQuickViews = 150;
 constexpr int64_t kIterations = 8000, kQuickIterations = 3000, kQuickCalibrateIterations = 600;
@@ -120,7 +120,7 @@ void AddTable(CLI::App* app) {
   command->add_option("--set", arguments->settings, "a key of the scenes: path.to.key=value");
   command->add_option("--scale", arguments->scale, "of the pictures' width and height (default: 1)")
       ->check(CLI::Range(1e-3, 8.0));
-  command->add_flag("--quick", arguments->quick, "small frames and short runs: a quarter of an hour");
+  command->add_flag("--quick", arguments->quick, "small frames and short runs");
   AddTrainArguments(command, &arguments->train, "--train-set");
 }
 

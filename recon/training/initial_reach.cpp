@@ -15,7 +15,7 @@ namespace {
 using Ray = RayBatch<float>::Ray;
 
 constexpr int kRays = 4096;
-// The deviation changes little within a tenth of the reach, and so do the results of training.
+// From a reach to the next: within a tenth the deviation changes little.
 constexpr double kStep = 1.15;
 // A logarithm that is farther from the median says that the pixel shows something else than a wall like the
 // others: a glint, a shadow.

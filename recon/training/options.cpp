@@ -132,6 +132,7 @@ void ReadField(const ConfigTable& root, FieldOptions* field) {
   if (const auto initial = root.Optional("initial")) {
     ReadChoice(*initial, "shape", kShapeNames, &field->initial.shape);
     field->initial.radius_mm = initial->Number("radius_mm", field->initial.radius_mm, kPositive);
+    // A reach that is said is meant.
     if (initial->Has("reach_mm")) field->initial.fit_reach = false;
     field->initial.reach_mm = initial->Number("reach_mm", field->initial.reach_mm, kNotNegative);
     field->initial.fit_reach = initial->Flag("fit_reach", field->initial.fit_reach);

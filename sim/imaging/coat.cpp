@@ -15,6 +15,18 @@ constexpr float kInversePi = static_cast<float>(1 / kPi);
 float Slant(float alpha, float cosine) {
   return std::sqrt(alpha * alpha + (1 - alpha * alpha) * cosine * cosine);
 }
+Lanes Slant(float alpha, const Lanes& cosine) {
+  const Lanes squared = Broadcast(alpha * alpha);
+  return Sqrt(squared + (1.0f - squared) * cosine * cosine);
+}
+
+// ggx::Distribution of half vectors about normals.
+Lanes Distribution(float alpha, const Lanes3& half, const Lanes3& normal) {
+  const Lanes along = Dot(half, normal), squared = Broadcast(alpha * alpha);
+  const Lanes3 across = Cross(half, normal);
+  const Lanes spread = squared * along * along + Dot(across, across);
+  return along > 0.0f ? squared * kInversePi / (spread * spread) : Lanes{};
+}
 
 }  // namespace
 
@@ -168,18 +180,15 @@ CoatLobesLanes Coat::Eval(const CoatedLanes& places, const Lanes3& incoming) con
   lobes.glint = zero;
   const LanesI mirrors = lit & (cos_in > 0.0f) & (cos_out > 0.0f);
   if (!Any(mirrors)) return lobes;
-  const Lanes3 half = Normalized(incoming + places.outgoing), across = Cross(half, places.coat_normal);
-  const Lanes along = Dot(half, places.coat_normal), squared = Broadcast(alpha_ * alpha_);
-  const Lanes spread = squared * along * along + Dot(across, across);
-  const auto slant = [&](const Lanes& c) { return Sqrt(squared + (1.0f - squared) * c * c); };
-  const Lanes visibility = 0.5f / (cos_out * slant(cos_in) + cos_in * slant(cos_out));
+  const Lanes3 half = Normalized(incoming + places.outgoing);
+  const Lanes visibility = 0.5f / (cos_out * Slant(alpha_, cos_in) + cos_in * Slant(alpha_, cos_out));
   const Lanes c = Min(Max(Dot(half, places.outgoing), zero), Broadcast(1));
   const Lanes refracted = Sqrt(1.0f - (1.0f - c * c) * (1 / (ior_ * ior_)));
   const Lanes parallel = (ior_ * c - refracted) / (ior_ * c + refracted);
   const Lanes perpendicular = (c - ior_ * refracted) / (c + ior_ * refracted);
   const Lanes fresnel = 0.5f * (parallel * parallel + perpendicular * perpendicular);
-  const Lanes glint = cos_in * fresnel * visibility * (squared * kInversePi / (spread * spread));
-  lobes.glint = mirrors & (along > 0.0f) ? glint : zero;
+  const Lanes glint = cos_in * fresnel * visibility * Distribution(alpha_, half, places.coat_normal);
+  lobes.glint = mirrors ? glint : zero;
   return lobes;
 }
 
@@ -208,12 +217,8 @@ Lanes Coat::Pdf(const CoatedLanes& places, const Lanes3& incoming) const {
   const LanesI mirrors = cos_out > 0.0f;
   const Lanes share =
       mirrors ? places.reflectance / (places.reflectance + (1.0f - places.reflectance) * palest) : zero;
-  const Lanes3 half = Normalized(incoming + places.outgoing), across = Cross(half, places.coat_normal);
-  const Lanes along = Dot(half, places.coat_normal), squared = Broadcast(alpha_ * alpha_);
-  const Lanes spread = squared * along * along + Dot(across, across);
-  const Lanes distribution = along > 0.0f ? squared * kInversePi / (spread * spread) : zero;
-  const Lanes slant = Sqrt(squared + (1.0f - squared) * cos_out * cos_out);
-  const Lanes mirrored = mirrors ? distribution / (2.0f * (cos_out + slant)) : zero;
+  const Lanes distribution = Distribution(alpha_, Normalized(incoming + places.outgoing), places.coat_normal);
+  const Lanes mirrored = mirrors ? distribution / (2.0f * (cos_out + Slant(alpha_, cos_out))) : zero;
   return (1.0f - share) * (cosine > 0.0f ? cosine * kInversePi : zero) + share * mirrored;
 }
 

@@ -16,7 +16,7 @@ class GlintPaths {
   GlintPaths(const BouncePaths<true>& paths, uint32_t first_pair, Lanes3* light)
       : paths_(paths), pairs_(first_pair), light_(light) {}
 
-  // Starts the paths of those of a block's places that look. sampler(i): of lane i.
+  // Starts the paths of those of a block's places that look. sampler_of(i): the sampler of lane i.
   template <class SamplerOf>
   void Start(const Eye& eye, int block, const CoatedPlaces& places, const SamplerOf& sampler_of,
              int64_t* rays) {
