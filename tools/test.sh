@@ -6,4 +6,6 @@ cd "$(dirname "$0")/.."
 tools/build.sh
 build=${LUMEN_BUILD:-build}
 ctest --test-dir "$build" --output-on-failure --timeout 600 -j "$(nproc)" "$@"
-echo "The tests' log lies at $build/Testing/Temporary/LastTest.log"
+log=$build/Testing/Temporary/LastTest.log
+# ctest counts suites, of which each may hold tests that found no data.
+echo "$(grep -c '^\[       OK \]' "$log") tests passed, $(grep -c '^\[  SKIPPED \].*(' "$log") skipped; their log lies at $log"
