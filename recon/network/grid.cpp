@@ -1,6 +1,7 @@
 #include "recon/network/grid.h"
 
 #include <cmath>
+#include <cstring>
 
 #include "common/random.h"
 
@@ -10,6 +11,12 @@ template <class T>
 struct Grid<T>::Cell {
   alignas(64) int32_t entry[8][kTile];  // corner c: bit d of c set = the upper corner along axis d
   alignas(64) T fraction[3][kTile];     // position within the cell, 0…1
+};
+
+// A number for each feature of each of the eight corners of a tile's cells.
+template <class T>
+struct Grid<T>::Corners {
+  alignas(64) T value[kFeatures][8][kTile];
 };
 
 template <class T>
@@ -80,26 +87,59 @@ void Grid<T>::Locate(const Level& level, const T* positions, Cell* cell) const {
   }
 }
 
+// An entry is moved as one: gather instructions fetch its numbers one by one, and are slow on processors that
+// guard them against speculation.
+template <class T>
+void Grid<T>::Fetch(const T* table, const Cell& cell, Corners* corners) {
+  alignas(64) T entries[kTile * kFeatures];
+  for (int c = 0; c < 8; ++c) {
+    for (int s = 0; s < kTile; ++s)
+      std::memcpy(&entries[kFeatures * s], table + kFeatures * cell.entry[c][s], kFeatures * sizeof(T));
+    for (int s = 0; s < kTile; ++s)
+      for (int f = 0; f < kFeatures; ++f) corners->value[f][c][s] = entries[kFeatures * s + f];
+  }
+}
+
+// And the way back: table += numbers, for the first `samples` of the tile.
+template <class T>
+void Grid<T>::Scatter(const Corners& corners, const Cell& cell, int samples, T* table) {
+  typedef T Entry __attribute__((vector_size(kFeatures * sizeof(T))));
+  alignas(64) T entries[8][kTile * kFeatures];
+  for (int c = 0; c < 8; ++c) {
+    for (int s = 0; s < kTile; ++s)
+      for (int f = 0; f < kFeatures; ++f) entries[c][kFeatures * s + f] = corners.value[f][c][s];
+  }
+  for (int s = 0; s < samples; ++s) {
+    for (int c = 0; c < 8; ++c) {
+      T* entry = table + kFeatures * cell.entry[c][s];
+      Entry sum, part;
+      std::memcpy(&sum, entry, sizeof(Entry));
+      std::memcpy(&part, &entries[c][kFeatures * s], sizeof(Entry));
+      sum += part;
+      std::memcpy(entry, &sum, sizeof(Entry));
+    }
+  }
+}
+
 template <class T>
 void Grid<T>::Encode(const T* tables, const Panel<T>& positions, Panel<T>* encoding) const {
   Cell cell;
+  Corners corners;
   for (int tile = 0; tile < positions.tiles(); ++tile) {
     for (int l = 0; l < levels(); ++l) {
-      const Level& level = levels_[l];
-      const T* table = tables + level.offset;
-      Locate(level, positions.Tile(tile), &cell);
+      Locate(levels_[l], positions.Tile(tile), &cell);
+      Fetch(tables + levels_[l].offset, cell, &corners);
       for (int f = 0; f < kFeatures; ++f) {
+        const auto& value = corners.value[f];
         T* out = encoding->Row(tile, l * kFeatures + f);
         for (int s = 0; s < kTile; ++s) {
           const T fx = cell.fraction[0][s], fy = cell.fraction[1][s], fz = cell.fraction[2][s];
-          const T v0 = table[2 * cell.entry[0][s] + f], v1 = table[2 * cell.entry[1][s] + f];
-          const T v2 = table[2 * cell.entry[2][s] + f], v3 = table[2 * cell.entry[3][s] + f];
-          const T v4 = table[2 * cell.entry[4][s] + f], v5 = table[2 * cell.entry[5][s] + f];
-          const T v6 = table[2 * cell.entry[6][s] + f], v7 = table[2 * cell.entry[7][s] + f];
-          const T v01 = v0 + fx * (v1 - v0), v23 = v2 + fx * (v3 - v2);
-          const T v45 = v4 + fx * (v5 - v4), v67 = v6 + fx * (v7 - v6);
-          const T low = v01 + fy * (v23 - v01), high = v45 + fy * (v67 - v45);
-          out[s] = low + fz * (high - low);
+          const T v00 = value[0][s] + fx * (value[1][s] - value[0][s]);
+          const T v10 = value[2][s] + fx * (value[3][s] - value[2][s]);
+          const T v01 = value[4][s] + fx * (value[5][s] - value[4][s]);
+          const T v11 = value[6][s] + fx * (value[7][s] - value[6][s]);
+          const T v0 = v00 + fy * (v10 - v00), v1 = v01 + fy * (v11 - v01);
+          out[s] = v0 + fz * (v1 - v0);
         }
       }
     }
@@ -110,15 +150,14 @@ template <class T>
 void Grid<T>::EncodeWithJacobian(const T* tables, const Panel<T>& positions, Panel<T>* encoding,
                                  Panel<T>* jacobian) const {
   Cell cell;
-  alignas(64) T value[8][kTile];
+  Corners corners;
   for (int tile = 0; tile < positions.tiles(); ++tile) {
     for (int l = 0; l < levels(); ++l) {
-      const Level& level = levels_[l];
-      const T* table = tables + level.offset;
-      Locate(level, positions.Tile(tile), &cell);
+      const T inverse_cell = levels_[l].inverse_cell;
+      Locate(levels_[l], positions.Tile(tile), &cell);
+      Fetch(tables + levels_[l].offset, cell, &corners);
       for (int f = 0; f < kFeatures; ++f) {
-        for (int c = 0; c < 8; ++c)
-          for (int s = 0; s < kTile; ++s) value[c][s] = table[2 * cell.entry[c][s] + f];
+        const auto& value = corners.value[f];
         const int row = l * kFeatures + f;
         T* out = encoding->Row(tile, row);
         T* dx = jacobian->Row(tile, row);
@@ -126,19 +165,17 @@ void Grid<T>::EncodeWithJacobian(const T* tables, const Panel<T>& positions, Pan
         T* dz = jacobian->Row(tile, 2 * outputs() + row);
         for (int s = 0; s < kTile; ++s) {
           const T fx = cell.fraction[0][s], fy = cell.fraction[1][s], fz = cell.fraction[2][s];
-          const T v00 = value[0][s] + fx * (value[1][s] - value[0][s]);
-          const T v10 = value[2][s] + fx * (value[3][s] - value[2][s]);
-          const T v01 = value[4][s] + fx * (value[5][s] - value[4][s]);
-          const T v11 = value[6][s] + fx * (value[7][s] - value[6][s]);
-          const T v0 = v00 + fy * (v10 - v00), v1 = v01 + fy * (v11 - v01);
           const T d00 = value[1][s] - value[0][s], d10 = value[3][s] - value[2][s];
           const T d01 = value[5][s] - value[4][s], d11 = value[7][s] - value[6][s];
-          const T d0 = d00 + fy * (d10 - d00), d1 = d01 + fy * (d11 - d01);
+          const T v00 = value[0][s] + fx * d00, v10 = value[2][s] + fx * d10;
+          const T v01 = value[4][s] + fx * d01, v11 = value[6][s] + fx * d11;
           const T e0 = v10 - v00, e1 = v11 - v01;
+          const T v0 = v00 + fy * e0, v1 = v01 + fy * e1;
+          const T d0 = d00 + fy * (d10 - d00), d1 = d01 + fy * (d11 - d01);
           out[s] = v0 + fz * (v1 - v0);
-          dx[s] = level.inverse_cell * (d0 + fz * (d1 - d0));
-          dy[s] = level.inverse_cell * (e0 + fz * (e1 - e0));
-          dz[s] = level.inverse_cell * (v1 - v0);
+          dx[s] = inverse_cell * (d0 + fz * (d1 - d0));
+          dy[s] = inverse_cell * (e0 + fz * (e1 - e0));
+          dz[s] = inverse_cell * (v1 - v0);
         }
       }
     }
@@ -152,7 +189,7 @@ void Grid<T>::BackwardImpl(int l, const Panel<T>& positions, const Panel<T>& del
   const Level& level = levels_[l];
   T* table = gradient + level.offset;
   Cell cell;
-  alignas(64) T share[8][kFeatures][kTile];
+  Corners share;
   for (int tile = 0; tile * kTile < count; ++tile) {
     Locate(level, positions.Tile(tile), &cell);
     const T* delta0 = delta.Row(tile, l * kFeatures);
@@ -162,26 +199,19 @@ void Grid<T>::BackwardImpl(int l, const Panel<T>& positions, const Panel<T>& del
         const T fx = cell.fraction[0][s], fy = cell.fraction[1][s], fz = cell.fraction[2][s];
         const T wx = c & 1 ? fx : 1 - fx, wy = c & 2 ? fy : 1 - fy, wz = c & 4 ? fz : 1 - fz;
         const T weight = wx * wy * wz;
-        share[c][0][s] = weight * delta0[s];
-        share[c][1][s] = weight * delta1[s];
+        share.value[0][c][s] = weight * delta0[s];
+        share.value[1][c][s] = weight * delta1[s];
         if constexpr (kSecondOrder) {
           const T* u = direction->Tile(tile);
           const T along = level.inverse_cell * ((c & 1 ? u[s] : -u[s]) * wy * wz +
                                                 (c & 2 ? u[kTile + s] : -u[kTile + s]) * wx * wz +
                                                 (c & 4 ? u[2 * kTile + s] : -u[2 * kTile + s]) * wx * wy);
-          share[c][0][s] += along * pull->Row(tile, l * kFeatures)[s];
-          share[c][1][s] += along * pull->Row(tile, l * kFeatures + 1)[s];
+          share.value[0][c][s] += along * pull->Row(tile, l * kFeatures)[s];
+          share.value[1][c][s] += along * pull->Row(tile, l * kFeatures + 1)[s];
         }
       }
     }
-    const int samples = std::min(kTile, count - tile * kTile);
-    for (int s = 0; s < samples; ++s) {
-      for (int c = 0; c < 8; ++c) {
-        T* entry = table + 2 * cell.entry[c][s];
-        entry[0] += share[c][0][s];
-        entry[1] += share[c][1][s];
-      }
-    }
+    Scatter(share, cell, std::min(kTile, count - tile * kTile), table);
   }
 }
 

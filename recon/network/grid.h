@@ -60,6 +60,9 @@ class Grid {
   };
   struct Cell;  // where the samples of a tile lie in a level
   void Locate(const Level& level, const T* positions, Cell* cell) const;
+  struct Corners;  // the numbers there
+  static void Fetch(const T* table, const Cell& cell, Corners* corners);
+  static void Scatter(const Corners& corners, const Cell& cell, int samples, T* table);
   template <bool kSecondOrder>
   void BackwardImpl(int level, const Panel<T>& positions, const Panel<T>& delta, const Panel<T>* pull,
                     const Panel<T>* direction, int count, T* gradient) const;

@@ -252,13 +252,7 @@ void Mlp<T>::BackwardSecondOrder(const T* parameters, const Panel<T>& input, con
   }
   // b_L = e₀: only the first row of W_L gains, Σ_samples φ_(L−1).
   const Panel<T>& below = last > 0 ? pass->tangent[last - 1] : direction;
-  for (int tile = 0; tile < below.tiles(); ++tile) {
-    for (int i = 0; i < layers_[last].inputs; ++i) {
-      T total = 0;
-      for (int s = 0; s < kTile; ++s) total += below.Row(tile, i)[s];
-      gradient[layers_[last].weight + i] += total;
-    }
-  }
+  AccumulateRows(below, gradient + layers_[last].weight);
 }
 
 template class Mlp<float>;

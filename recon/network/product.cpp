@@ -1,5 +1,7 @@
 #include "recon/network/product.h"
 
+#include <cstring>
+
 namespace lumen {
 namespace {
 
@@ -10,6 +12,33 @@ struct Lanes {
   static constexpr int kCount = 64 / sizeof(T);
   static constexpr int kPerRow = kTile / kCount;
 };
+
+// The sum over a register's lanes, by halves: one after another each addition would wait for the one before.
+template <class T>
+T SumOfLanes(const typename Lanes<T>::Vector& lanes) {
+  typedef T Half __attribute__((vector_size(32)));
+  typedef T Quarter __attribute__((vector_size(16)));
+  Half halves[2];
+  std::memcpy(halves, &lanes, sizeof halves);
+  const Half half = halves[0] + halves[1];
+  Quarter quarters[2];
+  std::memcpy(quarters, &half, sizeof quarters);
+  const Quarter quarter = quarters[0] + quarters[1];
+  if constexpr (sizeof(T) == 8) {
+    return quarter[0] + quarter[1];
+  } else {
+    return (quarter[0] + quarter[2]) + (quarter[1] + quarter[3]);
+  }
+}
+
+// The sum over the samples of a tile.
+template <class T>
+T SumOfRow(const T* row) {
+  using Vector = typename Lanes<T>::Vector;
+  Vector sum = {};
+  for (int v = 0; v < Lanes<T>::kPerRow; ++v) sum += reinterpret_cast<const Vector*>(row)[v];
+  return SumOfLanes<T>(sum);
+}
 
 // kRows rows of the result at a time: their sums stay in registers while the columns stream by.
 template <class T, int kRows>
@@ -68,9 +97,7 @@ void AccumulateBlock(const Panel<T>& y, int first_output, const Panel<T>& x, int
   }
   for (int o = 0; o < kOutputs; ++o) {
     for (int i = 0; i < kInputs; ++i) {
-      T total = 0;
-      for (int lane = 0; lane < Lanes<T>::kCount; ++lane) total += sum[o][i][lane];
-      gradient[size_t(o) * x.rows() + i] += total;
+      gradient[size_t(o) * x.rows() + i] += SumOfLanes<T>(sum[o][i]);
     }
   }
 }
@@ -152,20 +179,20 @@ void AccumulateOuter(const Panel<T>& y, const Panel<T>& x, T* gradient, T* bias_
     for (int begin = 0; begin < y.tiles(); begin += group)
       AccumulateGroup(y, x, {begin, std::min(begin + group, y.tiles())}, gradient);
   }
-  if (!bias_gradient) return;
-  for (int tile = 0; tile < y.tiles(); ++tile) {
-    for (int o = 0; o < outputs; ++o) {
-      T total = 0;
-      for (int s = 0; s < kTile; ++s) total += y.Row(tile, o)[s];
-      bias_gradient[o] += total;
-    }
-  }
+  if (bias_gradient) AccumulateRows(y, bias_gradient);
 }
 
-#define LUMEN_INSTANTIATE(T)                                             \
-  template void Multiply<T>(const T*, const T*, int, int, const T*, T*); \
-  template void MultiplyTransposed<T>(const T*, int, int, const T*, T*); \
-  template void AccumulateOuter<T>(const Panel<T>&, const Panel<T>&, T*, T*);
+template <class T>
+void AccumulateRows(const Panel<T>& y, T* sums) {
+  for (int tile = 0; tile < y.tiles(); ++tile)
+    for (int o = 0; o < y.rows(); ++o) sums[o] += SumOfRow(y.Row(tile, o));
+}
+
+#define LUMEN_INSTANTIATE(T)                                                  \
+  template void Multiply<T>(const T*, const T*, int, int, const T*, T*);      \
+  template void MultiplyTransposed<T>(const T*, int, int, const T*, T*);      \
+  template void AccumulateOuter<T>(const Panel<T>&, const Panel<T>&, T*, T*); \
+  template void AccumulateRows<T>(const Panel<T>&, T*);
 LUMEN_INSTANTIATE(float)
 LUMEN_INSTANTIATE(double)
 #undef LUMEN_INSTANTIATE

@@ -1,4 +1,4 @@
-// The three matrix products of a network's layer, on panels. T = float or double.
+// The three matrix products of a network's layer and the sum over samples, on panels. T = float or double.
 #pragma once
 
 #include "recon/network/panel.h"
@@ -18,5 +18,9 @@ void MultiplyTransposed(const T* weight, int outputs, int inputs, const T* y, T*
 // null.
 template <class T>
 void AccumulateOuter(const Panel<T>& y, const Panel<T>& x, T* gradient, T* bias_gradient);
+
+// sums[o] += Σ_samples y[o] over all tiles.
+template <class T>
+void AccumulateRows(const Panel<T>& y, T* sums);
 
 }  // namespace lumen
