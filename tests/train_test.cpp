@@ -5,12 +5,15 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <cmath>
+
 #include "common/error.h"
 #include "common/files.h"
 #include "common/parallel.h"
 #include "common/progress.h"
 #include "recon/training/checkpoint.h"
 #include "recon/training/estimate.h"
+#include "recon/training/trainer.h"
 #include "tests/child_process.h"
 #include "tests/small_sequence.h"
 
@@ -176,6 +179,32 @@ TEST(Checkpoint, DamageIsRefused) {
   EXPECT_THROW(ReadCheckpoint(folder / "checkpoint", "others", &back), InputError);
   back.first.resize(2);
   EXPECT_THROW(ReadCheckpoint(folder / "checkpoint", "settings", &back), InputError);
+}
+
+// The fog's own sharpness at first, the schedule's from the fog's last step on; whichever of the two limits
+// comes first.
+TEST(Schedule, FogLiftsAndLeavesTheScheduleAsItWas) {
+  const TrainingFrames frames(test::SmallSequence(), 20, true);
+  const auto sharpness = [&](const std::vector<std::string>& settings, double progress_a_step) {
+    std::vector<std::string> all = {"sampling.rays=4", "network.interreflection=\"none\"",
+                                    "schedule.sharpness_start_per_mm=0.5",
+                                    "schedule.sharpness_end_per_mm=2.0"};
+    all.insert(all.end(), settings.begin(), settings.end());
+    Trainer trainer(frames, ReadTrainOptions("fast", all), 0);
+    std::vector<double> values;
+    for (int step = 0; step < 8; ++step)
+      values.push_back(trainer.Step(step * progress_a_step).sharpness_per_mm);
+    return values;
+  };
+  const auto without = sharpness({"schedule.fog_iterations=0"}, 0.02);
+  const auto by_steps = sharpness({"schedule.fog_iterations=4", "schedule.fog_per_mm=0.125"}, 0.02);
+  const auto by_share = sharpness({"schedule.fog_iterations=1000", "schedule.fog_per_mm=0.125"}, 0.1);
+  for (int step = 0; step < 8; ++step) {
+    EXPECT_NEAR(without[step], 0.5 * std::pow(4, 0.02 * step), 1e-5);
+    EXPECT_NEAR(by_steps[step], without[step] * std::pow(0.25, std::max(0.0, 1 - step / 4.0)), 1e-5);
+    EXPECT_NEAR(by_share[step], 0.5 * std::pow(4, 0.1 * step) * std::pow(0.25, std::max(0.0, 1 - step / 2.0)),
+                1e-5);
+  }
 }
 
 }  // namespace

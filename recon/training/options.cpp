@@ -24,6 +24,8 @@ fit_reach = false
 reflectance = "unlit"
 [loss]
 albedo = 0.0
+[schedule]
+fog_iterations = 0
 )";
 
 // NeuS's published configuration for scenes without masks (Wang et al. 2021), its unit being 68 mm. Warm-up:
@@ -183,6 +185,8 @@ void ReadRest(const ConfigTable& root, TrainOptions* options) {
     s.sharpness_start_per_mm =
         schedule->Number("sharpness_start_per_mm", s.sharpness_start_per_mm, kPositive);
     s.sharpness_end_per_mm = schedule->Number("sharpness_end_per_mm", s.sharpness_end_per_mm, kPositive);
+    s.fog_per_mm = schedule->Number("fog_per_mm", s.fog_per_mm, kPositive);
+    s.fog_iterations = schedule->Integer("fog_iterations", s.fog_iterations, {0, 1e12});
     s.checkpoint_seconds = schedule->Number("checkpoint_seconds", s.checkpoint_seconds, kNotNegative);
   }
   if (const auto poses = root.Optional("poses")) {
@@ -288,6 +292,7 @@ std::string FormatTrainOptions(const TrainOptions& o) {
       << "\nadam_beta2 = " << o.schedule.adam_beta2 << "\nsharpness_rate = " << o.schedule.sharpness_rate
       << "\nsharpness_start_per_mm = " << o.schedule.sharpness_start_per_mm
       << "\nsharpness_end_per_mm = " << o.schedule.sharpness_end_per_mm
+      << "\nfog_per_mm = " << o.schedule.fog_per_mm << "\nfog_iterations = " << o.schedule.fog_iterations
       << "\ncheckpoint_seconds = " << o.schedule.checkpoint_seconds
       << "\n\n[poses]\nrefine = " << (o.poses.refine ? "true" : "false")
       << "\ntranslation_rate_mm = " << o.poses.translation_rate_mm

@@ -67,6 +67,10 @@ struct TrainOptions {
     double adam_beta2 = 0.99;
     double sharpness_start_per_mm = 0.6;
     double sharpness_end_per_mm = 4.4;
+    // Before that the wall is a fog of this sharpness, in which all of it can still move: it lifts, the
+    // logarithm at an even pace, over so many iterations or a fifth of the run, whichever ends sooner.
+    double fog_per_mm = 0.2;
+    int64_t fog_iterations = 200;
     // > 0: the sharpness is learnt from its start on, its logarithm at so many times the learning rate. 0: it
     // grows from start to end by schedule.
     double sharpness_rate = 0;

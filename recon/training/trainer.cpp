@@ -20,6 +20,8 @@ constexpr int kPieceRays = 4;
 
 constexpr int64_t kSurroundingsEvery = 250;  // iterations
 
+constexpr double kLongestFog = 0.2;  // as a part of the run
+
 double LogInterpolate(double from, double to, double at) { return from * std::pow(to / from, at); }
 
 }  // namespace
@@ -131,13 +133,22 @@ const float* Trainer::Weights() {
   return weights_.data();
 }
 
+double Trainer::SharpnessAt(double progress) const {
+  const auto& schedule = options_.schedule;
+  const double set = LogInterpolate(schedule.sharpness_start_per_mm, schedule.sharpness_end_per_mm, progress);
+  if (schedule.fog_iterations == 0) return set;
+  const double lifted =
+      std::max(static_cast<double>(state_.iteration) / static_cast<double>(schedule.fog_iterations),
+               progress / kLongestFog);
+  if (lifted >= 1) return set;
+  return set * std::pow(schedule.fog_per_mm / schedule.sharpness_start_per_mm, 1 - lifted);
+}
+
 LossSettings<float> Trainer::SettingsAt(double progress) const {
   const auto& schedule = options_.schedule;
   LossSettings<float> settings;
-  settings.sharpness = schedule.sharpness_rate > 0
-                           ? std::exp(state_.log_sharpness[0])
-                           : static_cast<float>(LogInterpolate(schedule.sharpness_start_per_mm,
-                                                               schedule.sharpness_end_per_mm, progress));
+  settings.sharpness = static_cast<float>(schedule.sharpness_rate > 0 ? std::exp(state_.log_sharpness[0])
+                                                                      : SharpnessAt(progress));
   settings.inverse_gamma = static_cast<float>(frames_.inverse_gamma());
   settings.eikonal_weight = static_cast<float>(options_.loss.eikonal);
   const bool lambertian = options_.field.reflectance == Reflectance::kLambertian;

@@ -85,6 +85,7 @@ class Trainer {
   void RunChunk(int index, const float* weights, const LossSettings<float>& settings);
   void ClearChunks();
   double RateAt(double progress) const;
+  double SharpnessAt(double progress) const;
   LossSettings<float> SettingsAt(double progress) const;
   bool GradientsAreFinite() const;
   bool has_surroundings() const;
