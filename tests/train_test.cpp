@@ -104,6 +104,26 @@ TEST(Train, OneFrameDoesWithoutTheFreeFactorOfLightBetweenWalls) {
   EXPECT_EQ(configured(1, "radiosity"), "radiosity");  // the surface says what it sends itself
 }
 
+// They are of the same start whatever the run's length, and the run ends as it would without them.
+TEST(Train, MeshesOnTheWayAreWrittenAndChangeNothing) {
+  const ScratchFolder folder;
+  const auto train = [&](const std::string& name, int iterations, const std::vector<double>& meshes_at) {
+    TrainRun run;
+    run.folder = folder / name;
+    run.meshes_at = meshes_at;
+    Train(SmallSequence(), ReadTrainOptions("fast", SmallSettings(iterations)), run);
+    return ReadFile(run.folder / "mesh.ply");
+  };
+  const std::string plain = train("plain", 20, {});
+  EXPECT_EQ(train("with", 20, {0, 0.5}), plain);
+  EXPECT_NE(train("short", 6, {0}), plain);
+  const std::string start = ReadFile(MeshAtFile(folder / "with", 0)),
+                    half = ReadFile(MeshAtFile(folder / "with", 0.5));
+  EXPECT_EQ(ReadFile(MeshAtFile(folder / "short", 0)), start);
+  EXPECT_NE(start, half);
+  EXPECT_NE(half, plain);
+}
+
 TEST(TrainOptions, AreReadBackFromTheirText) {
   const TrainOptions options = ReadTrainOptions("fast", {"loss.eikonal=0.25", "network.sdf_hidden=[16, 8]"});
   EXPECT_EQ(options.loss.eikonal, 0.25);

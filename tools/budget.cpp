@@ -8,22 +8,15 @@
 #include "common/files.h"
 #include "common/progress.h"
 #include "tools/options.h"
-#include "tools/study/scaled_scene.h"
 #include "tools/study/budget_table.h"
-#include "tools/train_arguments.h"
+#include "tools/study/scaled_scene.h"
+#include "tools/study_arguments.h"
 
 namespace lumen {
 namespace {
 
-namespace fs = std::filesystem;
-
-struct Arguments {
-  fs::path scene, folder;
-  std::vector<std::string> settings, effects;
-  double scale = 0;  // 0 = not said
-  TrainArguments train;
-  int seeds = 0;  // 0 = not said
-  bool quick = false;
+struct Arguments : StudyArguments {
+  std::vector<std::string> effects;
 };
 
 // What holds where nothing else is said: differences show long before a run is at its best.
@@ -65,15 +58,6 @@ void LeaveOutOthers(const std::vector<BudgetEffect>& effects, const Arguments& a
   }
 }
 
-// What the runs follow from besides their options: the scene's file, the command line and the effects.
-std::string SubjectOf(const Arguments& arguments, const std::vector<BudgetEffect>& effects, double scale,
-                      uint64_t seed) {
-  std::string subject = fmt::format("scale = {}\nseed = {}\n", scale, seed);
-  for (const BudgetEffect& effect : effects) subject += "effect = " + effect.name + "\n";
-  for (const std::string& setting : arguments.settings) subject += setting + "\n";
-  return subject + ReadFile(arguments.scene);
-}
-
 std::string TitleOf(const Arguments& arguments, const Scene& scene, const BudgetOptions& options) {
   const CameraIntrinsics& camera = scene.calibration.camera;
   const auto& schedule = options.train.schedule;
@@ -94,15 +78,14 @@ nlohmann::json Run(const Arguments& arguments, const CommonOptions& common) {
   Scene scene = ReadScaledScene(arguments.scene, arguments.settings, common.seed, scale);
   const std::vector<BudgetEffect> effects = EffectsToMeasure(arguments, scene);
   LeaveOutOthers(effects, arguments, &scene);
-  options.subject = SubjectOf(arguments, effects, scale, common.seed);
+  for (const BudgetEffect& effect : effects) options.subject += "effect = " + effect.name + "\n";
+  options.subject += SubjectOf(arguments, scale, common.seed);
   const Budget budget = MeasureBudget(scene, effects, options);
 
   const std::string title = TitleOf(arguments, scene, options);
   fmt::print("{}\n{}", title, ToTable(budget));
   WriteFile(arguments.folder / "budget.csv", ToCsv(budget));
-  const Drawing page = DrawBudget(budget, title);
-  WriteFile(arguments.folder / "budget.svg", ToSvg(page));
-  WriteImage(arguments.folder / "budget.png", ToImage(page));
+  WritePictures(DrawBudget(budget, title), arguments.folder, "budget");
   Say("table and pictures in " + arguments.folder.string());
   nlohmann::json result = ToJson(budget);
   result["scene"] = arguments.scene.string();
@@ -119,22 +102,10 @@ void AddBudget(CLI::App* app) {
   CLI::App* command =
       AddSubcommand(app, "budget", "millimetres of error per physical effect: a table and a picture",
                     [=](const CommonOptions& common) { return Run(*arguments, common); });
-  command->add_option("scene", arguments->scene, "scene file (see scenes/README.md)")
-      ->required()
-      ->check(CLI::ExistingFile);
-  command
-      ->add_option("-o,--output", arguments->folder,
-                   "folder for budget.csv, .svg and .png; what it holds already isn't measured again")
-      ->required();
-  command->add_option("--set", arguments->settings, "a key of the scene: path.to.key=value");
-  command->add_option("--scale", arguments->scale, "of the picture's width and height (default: 0.5)")
-      ->check(CLI::Range(1e-3, 8.0));
+  AddStudyArguments(command, {"budget", "0.5", "short runs on small frames, one seed: some minutes"},
+                    arguments.get());
   command->add_option("--effect", arguments->effects,
                       "an effect to measure, by its name in the table; the others stay off (default: all)");
-  command->add_option("--seeds", arguments->seeds, "runs of every variant (default: 3)")
-      ->check(CLI::Range(1, 1000));
-  command->add_flag("--quick", arguments->quick, "short runs on small frames, one seed: some minutes");
-  AddTrainArguments(command, &arguments->train, "--train-set");
 }
 
 }  // namespace lumen

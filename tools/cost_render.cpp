@@ -10,6 +10,7 @@
 #include "tools/cost.h"
 #include "tools/options.h"
 #include "tools/study/scaled_scene.h"
+#include "tools/study_arguments.h"
 
 namespace lumen {
 namespace {
@@ -164,9 +165,7 @@ nlohmann::json Run(const Arguments& arguments, const CommonOptions& common) {
   WriteFile(arguments.folder / "cost_render.csv", ToCsv(cost.sampling));
   WriteFile(arguments.folder / "cost_render_bounces.csv", ToCsv(cost.transport));
   WriteFile(arguments.folder / "cost_render_effects.csv", EffectsCsv(cost));
-  const Drawing page = Page(cost);
-  WriteFile(arguments.folder / "cost_render.svg", ToSvg(page));
-  WriteImage(arguments.folder / "cost_render.png", ToImage(page));
+  WritePictures(Page(cost), arguments.folder, "cost_render");
   Say("curves and pictures in " + arguments.folder.string());
   return ToJson(cost);
 }

@@ -9,22 +9,17 @@
 #include "sim/render.h"
 #include "tools/cost.h"
 #include "tools/options.h"
+#include "tools/study/convergence.h"
 #include "tools/study/scaled_scene.h"
-#include "tools/train_arguments.h"
+#include "tools/study_arguments.h"
 
 namespace lumen {
 namespace {
 
 namespace fs = std::filesystem;
 
-struct Arguments {
-  fs::path scene, folder;
-  std::vector<std::string> settings;
-  double scale = 0;  // 0 = not said
-  TrainArguments train;
+struct Arguments : StudyArguments {
   std::vector<std::string> knobs;
-  int seeds = 0;  // 0 = not said
-  bool quick = false;
 };
 
 // What --quick stands for, where nothing else is said.
@@ -42,13 +37,6 @@ TrainOptions OwnOptions(const Arguments& arguments) {
   TrainOptions options = ReadTrainOptions(train.preset, train.Settings());
   options.schedule.seconds = 0;  // the settings are compared by their seconds
   return options;
-}
-
-// What the rendered frames follow from.
-std::string SubjectOf(const Arguments& arguments, double scale, uint64_t seed) {
-  std::string subject = fmt::format("scale = {}\nseed = {}\n", scale, seed);
-  for (const std::string& setting : arguments.settings) subject += setting + "\n";
-  return subject + ReadFile(arguments.scene);
 }
 
 // Renders the scene, unless that has been done in this folder.
@@ -79,6 +67,15 @@ std::string Table(const CostCurves& curves) {
                            NumberOrDash(point.errors[1]), point.is_default ? "  the run's own" : "",
                            IsOnFrontier(curves, point, 0) ? "  frontier" : "");
     }
+  }
+  return table;
+}
+
+std::string Table(const std::vector<ConvergencePoint>& convergence) {
+  std::string table = "\niteration of one run   surveyed mm     extended mm\n";
+  for (const ConvergencePoint& point : convergence) {
+    table += fmt::format("{:>20}{:>14.3f}{:>16.3f}\n", point.iteration, point.surveyed.mae_mm,
+                         point.extended.mae_mm);
   }
   return table;
 }
@@ -133,11 +130,18 @@ nlohmann::json Run(const Arguments& arguments, const CommonOptions& common) {
              sequence.calibration.camera.width, sequence.calibration.camera.height, options.seeds,
              Table(curves));
   WriteFile(arguments.folder / "cost_train.csv", ToCsv(curves));
-  const Drawing page = Page(curves);
-  WriteFile(arguments.folder / "cost_train.svg", ToSvg(page));
-  WriteImage(arguments.folder / "cost_train.png", ToImage(page));
+  WritePictures(Page(curves), arguments.folder, "cost_train");
+  const std::vector<ConvergencePoint> convergence =
+      DrawConvergence(sequence, options.own, common.seed, arguments.folder);
+  fmt::print("{}", Table(convergence));
   Say("curves and pictures in " + arguments.folder.string());
-  return ToJson(curves);
+  nlohmann::json json = ToJson(curves);
+  for (const ConvergencePoint& point : convergence) {
+    json["convergence"].push_back({{"iteration", point.iteration},
+                                   {"surveyed_mae_mm", point.surveyed.mae_mm},
+                                   {"extended_mae_mm", point.extended.mae_mm}});
+  }
+  return json;
 }
 
 }  // namespace
@@ -147,23 +151,11 @@ void AddCostTrain(CLI::App* cost) {
   CLI::App* command =
       AddSubcommand(cost, "train", "what a reconstruction's accuracy costs: knobs and their frontier",
                     [=](const CommonOptions& common) { return Run(*arguments, common); });
-  command->add_option("scene", arguments->scene, "scene file (see scenes/README.md)")
-      ->required()
-      ->check(CLI::ExistingFile);
-  command
-      ->add_option("-o,--output", arguments->folder,
-                   "folder for cost_train.csv, .svg and .png; what it holds already isn't measured again")
-      ->required();
-  command->add_option("--set", arguments->settings, "a key of the scene: path.to.key=value");
-  command->add_option("--scale", arguments->scale, "of the picture's width and height (default: 1)")
-      ->check(CLI::Range(1e-3, 8.0));
+  AddStudyArguments(command,
+                    {"cost_train", "1", "few settings of a short run on small frames, one seed: two minutes"},
+                    arguments.get());
   command->add_option("--knob", arguments->knobs,
                       "a knob to measure, by its name in the table (default: all)");
-  command->add_option("--seeds", arguments->seeds, "runs of every setting (default: 3)")
-      ->check(CLI::Range(1, 1000));
-  command->add_flag("--quick", arguments->quick,
-                    "few settings of a short run on small frames, one seed: two minutes");
-  AddTrainArguments(command, &arguments->train, "--train-set");
 }
 
 }  // namespace lumen

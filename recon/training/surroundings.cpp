@@ -12,8 +12,6 @@ namespace {
 // place says little, and it would outweigh all others.
 constexpr double kShallowestCosine = 0.25;
 
-constexpr float kSharp = 1e3f;  // 1/mm: all surface samples lie within a hundredth of a mm of the surface
-
 }  // namespace
 
 DirectionMap<float> SurroundingsOf(const Field<float>& field, const float* parameters,
@@ -25,16 +23,10 @@ DirectionMap<float> SurroundingsOf(const Field<float>& field, const float* param
     batch.rays[cell].origin = light.camera;
     batch.rays[cell].direction = light.camera_from_field.transpose() * DirectionMap<float>::Direction(cell);
   }
-  Marcher(&field).Place(parameters, sampling, kSharp, 0, &batch);
   Field<float>::SurfacePass pass;
-  pass.positions.Resize(3, TilesFor(kCells));
+  std::vector<float> distance;
+  MeetSurface(field, parameters, sampling, 0, &batch, &distance, &pass.positions);
   pass.normal.Resize(3, TilesFor(kCells));
-  std::vector<float> distance(kCells);
-  for (int i = 0; i < kCells; ++i) {
-    distance[i] = batch.distance[size_t(i + 1) * batch.samples - 1];
-    for (int d = 0; d < 3; ++d)
-      pass.positions.At(d, i) = batch.rays[i].origin[d] + distance[i] * batch.rays[i].direction[d];
-  }
   field.Surface(parameters, &pass);
   field.Color(parameters, &pass);
   const auto vector = [](const Panel<float>& panel, int i) {

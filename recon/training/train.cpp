@@ -71,8 +71,7 @@ class Run {
     Optimise();
     if (saved_iteration_ != trainer_.state().iteration) Save();
     SayWhichCamerasAreOutside();
-    const Mesh mesh =
-        ExtractMesh(trainer_.field(), trainer_.Weights(), trainer_.origin(), {options_.extract_cell_mm});
+    const Mesh mesh = MeshNow();
     if (mesh.faces.empty()) {
       throw InputError(run_.folder.string() +
                        ": training left no surface; check poses and light, or train longer");
@@ -125,6 +124,7 @@ class Run {
     while (true) {
       const double elapsed = SecondsSince(start);
       const double done = ProgressNow(seconds_before + elapsed);
+      WriteMeshesDue(done);
       if (done >= 1) break;
       const StepReport step = trainer_.Step(done);
       if (by_clock()) state.seconds = seconds_before + SecondsSince(start);
@@ -158,6 +158,19 @@ class Run {
                               options_.sampling.rays / std::max(SecondsSince(start), 1e-9);
     result_.stopped_by = by_clock() ? "seconds" : "iterations";
     result_.skipped_steps = state.skipped_steps;
+  }
+
+  Mesh MeshNow() {
+    return ExtractMesh(trainer_.field(), trainer_.Weights(), trainer_.origin(), {options_.extract_cell_mm});
+  }
+
+  // A resumed run keeps what it had written.
+  void WriteMeshesDue(double done) {
+    for (; meshes_written_ < run_.meshes_at.size() && run_.meshes_at[meshes_written_] <= done;
+         ++meshes_written_) {
+      const auto file = MeshAtFile(run_.folder, run_.meshes_at[meshes_written_]);
+      if (!run_.resume || !std::filesystem::exists(file)) WriteMesh(file, MeshNow());
+    }
   }
 
   void Save() {
@@ -221,12 +234,17 @@ class Run {
   std::string settings_;
   std::string log_;
   int64_t saved_iteration_ = -1;
+  size_t meshes_written_ = 0;
   int64_t skipped_in_a_row_ = 0;
   double photometric_ = -1;  // running mean; none yet
   TrainResult result_;
 };
 
 }  // namespace
+
+std::filesystem::path MeshAtFile(const std::filesystem::path& folder, double part) {
+  return folder / fmt::format("mesh_at_{:.3f}.ply", part);
+}
 
 TrainResult Train(const Sequence& sequence, const TrainOptions& options, const TrainRun& run) {
   return Run(sequence, options, run).Go();

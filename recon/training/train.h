@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "common/sequence.h"
 #include "recon/training/options.h"
@@ -15,7 +16,12 @@ struct TrainRun {
   std::filesystem::path folder;
   uint64_t seed = 0;
   bool resume = false;  // go on from the folder's checkpoint, if there is one
+  // Parts of the run, ascending, from 0 to below 1: the mesh as it is then is written too, as MeshAtFile says.
+  std::vector<double> meshes_at;
 };
+
+// FOLDER/mesh_at_0.038.ply for the part 0.038 of a run.
+std::filesystem::path MeshAtFile(const std::filesystem::path& folder, double part);
 
 struct TrainResult {
   double seconds = 0;      // of training; reading frames and extracting the mesh come on top

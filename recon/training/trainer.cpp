@@ -90,17 +90,13 @@ Trainer::Trainer(const TrainingFrames& frames, const TrainOptions& options, uint
 // scale is a trap: a dark wall that is near looks much like a bright one that is far.
 void Trainer::MatchColorsToInitialSurface(const InitialSurface& initial) {
   constexpr int kRays = 1024;
-  constexpr float kSharp = 1e3f;  // 1/mm: all surface samples lie within a hundredth of a mm of the surface
   RayBatch<float> batch;
   batch.rays.resize(kRays);
   const uint64_t key = RandomBits(seed_, 0x636f6c6f7273ull);
   for (int r = 0; r < kRays; ++r) frames_.Draw(RandomBits(key, r), origin_, &batch.rays[r]);
-  Marcher(field_.get()).Place(Weights(), options_.sampling, kSharp, key, &batch);
-  Panel<float> positions(3, TilesFor(kRays)), value(1, TilesFor(kRays)), normal(3, TilesFor(kRays));
-  for (int r = 0; r < kRays; ++r) {
-    const float t = batch.distance[size_t(r + 1) * batch.samples - 1];
-    for (int d = 0; d < 3; ++d) positions.At(d, r) = batch.rays[r].origin[d] + t * batch.rays[r].direction[d];
-  }
+  std::vector<float> distance;
+  Panel<float> positions, value(1, TilesFor(kRays)), normal(3, TilesFor(kRays));
+  MeetSurface(*field_, Weights(), options_.sampling, key, &batch, &distance, &positions);
   for (int tile = 0; tile < positions.tiles(); ++tile) {
     initial.Evaluate<float>(positions.Tile(tile), value.Row(tile, 0), normal.Tile(tile));
   }
