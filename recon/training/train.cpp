@@ -41,12 +41,15 @@ double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
 }
 
-// Without parallax a factor of light between walls that is free at every place explains any frame, on any
-// surface: the surface then leaves through the bounds.
+// Without parallax nothing brings back what the fog at the start has moved, and a factor of light between
+// walls that is free at every place explains any frame, on any surface: the surface then leaves through the
+// bounds.
 TrainOptions ForFrames(TrainOptions options, int taken) {
   const bool free_ambient = options.field.reflectance == Reflectance::kLambertian &&
                             options.field.interreflection == Interreflection::kMean;
-  if (taken > 1 || !free_ambient) return options;
+  if (taken > 1) return options;
+  options.schedule.fog_iterations = 0;
+  if (!free_ambient) return options;
   Say("one frame alone can't tell light between walls from distance: network.interreflection = \"none\"");
   options.field.interreflection = Interreflection::kNone;
   return options;
