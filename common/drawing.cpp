@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/files.h"
+
 namespace lumen {
 namespace {
 
@@ -185,6 +187,11 @@ Image8 ToImage(const Drawing& drawing, double scale) {
 double TextWidth(const std::string& text, double size) {
   const auto letters = std::count_if(text.begin(), text.end(), [](char c) { return (c & 0xc0) != 0x80; });
   return 0.57 * size * static_cast<double>(letters);
+}
+
+void WritePictures(const Drawing& drawing, const std::filesystem::path& folder, const std::string& name) {
+  WriteFile(folder / (name + ".svg"), ToSvg(drawing));
+  WriteImage(folder / (name + ".png"), ToImage(drawing));
 }
 
 }  // namespace lumen

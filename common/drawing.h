@@ -1,6 +1,7 @@
 // Pictures made of lines, discs, boxes and text, written as SVG or as pixels from one list.
 #pragma once
 
+#include <filesystem>
 #include <string>
 #include <variant>
 #include <vector>
@@ -53,6 +54,9 @@ std::string ToSvg(const Drawing& drawing);
 
 // Three channels, smooth edges; `scale` pixels a px of the drawing.
 Image8 ToImage(const Drawing& drawing, double scale = 1);
+
+// Both, as FOLDER/NAME.svg and .png.
+void WritePictures(const Drawing& drawing, const std::filesystem::path& folder, const std::string& name);
 
 // How wide a text comes out, by the mean letter of the sans serif fonts at hand.
 double TextWidth(const std::string& text, double size);

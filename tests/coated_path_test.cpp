@@ -132,7 +132,7 @@ TEST(CoatedPath, BounceIsTheIntegralOverTheHemisphere) {
     const CoatLobes lobes = coat.Eval(at, toward.cast<float>());
     return std::pair(fall * lobes.base[1], fall * (lobes.base[1] + lobes.glint));
   };
-  const int count = 100000;
+  const int count = 400000;
   double sum = 0, squares = 0, without_glints = 0;
   for (int i = 0; i < count; ++i) {
     const double z = 2 * UniformDouble(RandomBits(1, i, 0)) - 1,

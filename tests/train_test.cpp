@@ -84,9 +84,10 @@ TEST(Train, NeusSeesNoLightAndStillEndsWithAMesh) {
   EXPECT_TRUE(std::filesystem::exists(folder / "run/mesh.ply"));
 }
 
-// A single frame can't tell light between walls from distance, two can.
-TEST(Train, OneFrameDoesWithoutTheFreeFactorOfLightBetweenWalls) {
-  const auto configured = [](size_t frames, const std::string& interreflection) {
+// A single frame can't tell light between walls from distance, and brings back nothing that a fog moves; two
+// can.
+TEST(Train, OneFrameDoesWithoutTheFreeFactorOfLightBetweenWallsAndWithoutFog) {
+  const auto configured = [](size_t frames, const std::string& interreflection, const std::string& key) {
     const ScratchFolder folder;
     Sequence sequence = SmallSequence();
     sequence.frames.resize(frames);
@@ -95,13 +96,16 @@ TEST(Train, OneFrameDoesWithoutTheFreeFactorOfLightBetweenWalls) {
     std::vector<std::string> settings = SmallSettings(20);
     settings.push_back("network.interreflection=\"" + interreflection + "\"");
     Train(sequence, ReadTrainOptions("fast", settings), run);
-    const std::string config = ReadFile(folder / "config.toml"), key = "interreflection = \"";
-    const size_t begin = config.find(key) + key.size();
-    return config.substr(begin, config.find('"', begin) - begin);
+    const std::string config = ReadFile(folder / "config.toml"), name = "\n" + key + " = ";
+    const size_t begin = config.find(name) + name.size();
+    return config.substr(begin, config.find('\n', begin) - begin);
   };
-  EXPECT_EQ(configured(1, "mean"), "none");
-  EXPECT_EQ(configured(2, "mean"), "mean");
-  EXPECT_EQ(configured(1, "radiosity"), "radiosity");  // the surface says what it sends itself
+  EXPECT_EQ(configured(1, "mean", "interreflection"), "\"none\"");
+  EXPECT_EQ(configured(2, "mean", "interreflection"), "\"mean\"");
+  EXPECT_EQ(configured(1, "radiosity", "interreflection"),
+            "\"radiosity\"");  // the surface says what it sends itself
+  EXPECT_EQ(configured(1, "radiosity", "fog_iterations"), "0");
+  EXPECT_EQ(configured(2, "radiosity", "fog_iterations"), "200");
 }
 
 // They are of the same start whatever the run's length, and the run ends as it would without them.

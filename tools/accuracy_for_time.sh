@@ -12,7 +12,7 @@ shift
 seeds=(${SEEDS:-0 1 2})
 
 # mean_error FILE SURFACE: out of what `lumen evaluate --json` writes.
-mean_error() { tr -d ' \n' < "$1" | sed "s/.*\"$2\":{\"mae_mm\":\([0-9.e-]*\).*/\1/"; }
+mean_error() { tr -d ' \n' < "$1" | sed -n "s/.*\"$2\":{\"mae_mm\":\([0-9.e-]*\).*/\1/p"; }
 
 # median_and_range NUMBER...
 median_and_range() {

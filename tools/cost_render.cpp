@@ -10,7 +10,6 @@
 #include "tools/cost.h"
 #include "tools/options.h"
 #include "tools/study/scaled_scene.h"
-#include "tools/study_arguments.h"
 
 namespace lumen {
 namespace {

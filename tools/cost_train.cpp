@@ -49,6 +49,7 @@ Sequence Subject(const Arguments& arguments, const std::string& subject, double 
     const Scene scene = ReadScaledScene(arguments.scene, arguments.settings, seed, scale);
     CreateFolder(arguments.folder);
     fs::remove(marker);
+    fs::remove_all(arguments.folder / "convergence");
     Render(scene, options);
     WriteFile(marker, subject);
   }

@@ -32,9 +32,4 @@ std::string SubjectOf(const StudyArguments& arguments, double scale, uint64_t se
   return subject + ReadFile(arguments.scene);
 }
 
-void WritePictures(const Drawing& page, const std::filesystem::path& folder, const std::string& name) {
-  WriteFile(folder / (name + ".svg"), ToSvg(page));
-  WriteImage(folder / (name + ".png"), ToImage(page));
-}
-
 }  // namespace lumen

@@ -6,7 +6,6 @@
 #include <string>
 #include <vector>
 
-#include "common/drawing.h"
 #include "tools/train_arguments.h"
 
 namespace lumen {
@@ -30,8 +29,5 @@ void AddStudyArguments(CLI::App* command, const StudyHelp& help, StudyArguments*
 
 // What the frames follow from: a text that is another where they would be others.
 std::string SubjectOf(const StudyArguments& arguments, double scale, uint64_t seed);
-
-// As FOLDER/NAME.svg and .png.
-void WritePictures(const Drawing& page, const std::filesystem::path& folder, const std::string& name);
 
 }  // namespace lumen

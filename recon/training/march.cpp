@@ -98,19 +98,18 @@ void Marcher::Place(const float* parameters, const TrainOptions::Sampling& optio
   }
 }
 
-void MeetSurface(const Field<float>& field, const float* parameters, const TrainOptions::Sampling& sampling,
-                 uint64_t key, RayBatch<float>* batch, std::vector<float>* distance, Panel<float>* positions) {
+Panel<float> MeetSurface(const Field<float>& field, const float* parameters,
+                         const TrainOptions::Sampling& sampling, uint64_t key, RayBatch<float>* batch) {
   constexpr float kSharp = 1e3f;  // 1/mm: the samples around the surface lie within a hundredth of a mm of it
   Marcher(&field).Place(parameters, sampling, kSharp, key, batch);
   const int rays = static_cast<int>(batch->rays.size());
-  distance->resize(batch->rays.size());
-  positions->Resize(3, TilesFor(rays));
+  Panel<float> positions(3, TilesFor(rays));
   for (int r = 0; r < rays; ++r) {
     const auto& ray = batch->rays[r];
     const float t = batch->distance[size_t(r + 1) * batch->samples - 1];
-    (*distance)[r] = t;
-    for (int d = 0; d < 3; ++d) positions->At(d, r) = ray.origin[d] + t * ray.direction[d];
+    for (int d = 0; d < 3; ++d) positions.At(d, r) = ray.origin[d] + t * ray.direction[d];
   }
+  return positions;
 }
 
 }  // namespace lumen

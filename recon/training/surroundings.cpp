@@ -24,8 +24,7 @@ DirectionMap<float> SurroundingsOf(const Field<float>& field, const float* param
     batch.rays[cell].direction = light.camera_from_field.transpose() * DirectionMap<float>::Direction(cell);
   }
   Field<float>::SurfacePass pass;
-  std::vector<float> distance;
-  MeetSurface(field, parameters, sampling, 0, &batch, &distance, &pass.positions);
+  pass.positions = MeetSurface(field, parameters, sampling, 0, &batch);
   pass.normal.Resize(3, TilesFor(kCells));
   field.Surface(parameters, &pass);
   field.Color(parameters, &pass);
@@ -41,8 +40,8 @@ DirectionMap<float> SurroundingsOf(const Field<float>& field, const float* param
     patch.point = point.cast<double>();
     patch.normal = normal.cast<double>();
     const double cosine = std::max<double>(kShallowestCosine, -normal.dot(batch.rays[i].direction));
-    patch.area_mm2 =
-        double(DirectionMap<float>::SolidAngle(i)) * double(distance[i]) * double(distance[i]) / cosine;
+    const double distance = batch.distance[size_t(i + 1) * batch.samples - 1];
+    patch.area_mm2 = double(DirectionMap<float>::SolidAngle(i)) * distance * distance / cosine;
     patch.albedo = vector(pass.color_output(), i).array().exp().matrix().cast<double>();
     patch.irradiance =
         kPi * Shade<float>(Reflectance::kLambertian, Vec3f::Zero(), normal, light, point, Vec3f::Zero())

@@ -172,7 +172,9 @@ class Run {
     for (; meshes_written_ < run_.meshes_at.size() && run_.meshes_at[meshes_written_] <= done;
          ++meshes_written_) {
       const auto file = MeshAtFile(run_.folder, run_.meshes_at[meshes_written_]);
-      if (!run_.resume || !std::filesystem::exists(file)) WriteMesh(file, MeshNow());
+      if (run_.resume && std::filesystem::exists(file)) continue;
+      const Mesh mesh = MeshNow();
+      if (!mesh.faces.empty()) WriteMesh(file, mesh);
     }
   }
 

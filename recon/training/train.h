@@ -16,7 +16,8 @@ struct TrainRun {
   std::filesystem::path folder;
   uint64_t seed = 0;
   bool resume = false;  // go on from the folder's checkpoint, if there is one
-  // Parts of the run, ascending, from 0 to below 1: the mesh as it is then is written too, as MeshAtFile says.
+  // Parts of the run, ascending, from 0 to below 1: the mesh as it is then is written too, as MeshAtFile
+  // says, if it has a face.
   std::vector<double> meshes_at;
 };
 

@@ -20,7 +20,7 @@ constexpr int kPieceRays = 4;
 
 constexpr int64_t kSurroundingsEvery = 250;  // iterations
 
-constexpr double kLongestFog = 0.2;  // as a part of the run
+constexpr double kLongestFog = 0.2;  // as a part of the run: a short one, too, is to end with a wall
 
 double LogInterpolate(double from, double to, double at) { return from * std::pow(to / from, at); }
 
@@ -94,9 +94,8 @@ void Trainer::MatchColorsToInitialSurface(const InitialSurface& initial) {
   batch.rays.resize(kRays);
   const uint64_t key = RandomBits(seed_, 0x636f6c6f7273ull);
   for (int r = 0; r < kRays; ++r) frames_.Draw(RandomBits(key, r), origin_, &batch.rays[r]);
-  std::vector<float> distance;
-  Panel<float> positions, value(1, TilesFor(kRays)), normal(3, TilesFor(kRays));
-  MeetSurface(*field_, Weights(), options_.sampling, key, &batch, &distance, &positions);
+  const Panel<float> positions = MeetSurface(*field_, Weights(), options_.sampling, key, &batch);
+  Panel<float> value(1, TilesFor(kRays)), normal(3, TilesFor(kRays));
   for (int tile = 0; tile < positions.tiles(); ++tile) {
     initial.Evaluate<float>(positions.Tile(tile), value.Row(tile, 0), normal.Tile(tile));
   }

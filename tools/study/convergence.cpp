@@ -11,6 +11,8 @@
 
 namespace lumen {
 
+namespace fs = std::filesystem;
+
 std::vector<double> ConvergenceParts() {
   constexpr double kWhole = 65'000;
   return {2'500 / kWhole, 5'000 / kWhole, 12'500 / kWhole, 15'000 / kWhole, 1};
@@ -24,13 +26,19 @@ std::vector<ConvergencePoint> DrawConvergence(const Sequence& sequence, TrainOpt
   run.folder = folder / "convergence";
   run.seed = seed;
   run.meshes_at = {parts.begin(), parts.end() - 1};
+  // The run that its folder holds is gone on with, from its end too; another's meshes aren't this one's.
+  const std::string settings = "seed = " + std::to_string(seed) + "\n" + FormatTrainOptions(options);
+  const auto config = run.folder / "config.toml";
+  run.resume = fs::exists(config) && ReadFile(config) == settings;
+  if (!run.resume) fs::remove_all(run.folder);
   Train(sequence, options, run);
   const Mesh truth = ReadGroundTruth(sequence);
   std::vector<ConvergencePoint> points;
   std::vector<TitledStrip> strips;
   for (const double part : parts) {
-    const Mesh mesh = ReadMesh(part < 1 ? MeshAtFile(run.folder, part) : run.folder / "mesh.ply");
-    if (mesh.faces.empty()) continue;
+    const fs::path mesh_file = part < 1 ? MeshAtFile(run.folder, part) : run.folder / "mesh.ply";
+    if (!fs::exists(mesh_file)) continue;
+    const Mesh mesh = ReadMesh(mesh_file);
     const Evaluation evaluation = Evaluate(mesh, truth, sequence, {.seed = seed});
     if (!evaluation.surveyed.error || !evaluation.extended.error) continue;
     const auto iteration =

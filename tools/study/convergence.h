@@ -23,7 +23,8 @@ std::vector<double> ConvergenceParts();
 
 // Trains in FOLDER/convergence by iterations, and writes FOLDER/convergence.png: the middle frame beside the
 // surface as seen from there, coloured by its error, for each part. Parts without a surface that any frame
-// sees are left out. Throws InputError where the sequence has no ground truth.
+// sees are left out. A run that is there already, of the same options and seed, is taken. Throws InputError
+// where the sequence has no ground truth.
 std::vector<ConvergencePoint> DrawConvergence(const Sequence& sequence, TrainOptions options, uint64_t seed,
                                               const std::filesystem::path& folder);
 
