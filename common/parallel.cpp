@@ -3,9 +3,11 @@
 #include <tbb/global_control.h>
 #include <tbb/info.h>
 #include <tbb/parallel_for.h>
+#include <tbb/task_group.h>
 
 #include <algorithm>
 #include <memory>
+#include <utility>
 
 namespace lumen {
 namespace {
@@ -43,5 +45,25 @@ void ParallelChunks(int64_t begin, int64_t end, int64_t grain,
     body(first, std::min(first + grain, end));
   });
 }
+
+struct BackgroundWork::Tasks {
+  tbb::task_group group;
+};
+
+BackgroundWork::BackgroundWork() : tasks_(std::make_unique<Tasks>()) {}
+
+BackgroundWork::~BackgroundWork() {
+  try {
+    Finish();
+  } catch (...) {
+  }
+}
+
+void BackgroundWork::Start(std::function<void()> piece) {
+  Finish();
+  tasks_->group.run(std::move(piece));
+}
+
+void BackgroundWork::Finish() { tasks_->group.wait(); }
 
 }  // namespace lumen

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <optional>
 #include <regex>
+#include <utility>
 
 #include "common/error.h"
 #include "common/files.h"
@@ -50,6 +51,7 @@ class Renderer {
       RenderOne(frame, gains[frame]);
       progress.Update(double(++result_.frames) / static_cast<double>(frames_.size()));
     }
+    writing_.Finish();
     WriteSequence(gains);
     result_.effects = scene_.effects;
     result_.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -135,15 +137,19 @@ class Renderer {
     result_.samples += count.samples;
     result_.rays += count.rays;
     NoteFailure(frame, "", count.failure);
-    WriteImage(FrameFile(options_.folder, frame, "color.png"),
-               photographer_.Photograph(frame, gain, film.radiance));
-    if (scene_.truth.c3vd || !scene_.truth.exact.empty()) {
-      const FrameTruth truth = TruthOf(frame, *wall);
-      if (scene_.truth.c3vd) WriteC3vd(frame, truth);
-      if (!scene_.truth.exact.empty()) WriteExact(frame, film, truth);
-      if (Wants("mesh")) WriteMesh(options_.folder / "exact" / ExactName(frame, "_mesh.ply"), wall->mesh());
-    }
+    Image8 picture = photographer_.Photograph(frame, gain, film.radiance);
+    std::optional<FrameTruth> truth;
+    if (scene_.truth.c3vd || !scene_.truth.exact.empty()) truth = TruthOf(frame, *wall);
     NoteSeen(frame, *wall);
+    if (scene_.truth.exact.empty()) film = {};
+    // Compressing takes one thread, as long as half of a frame of direct light does.
+    writing_.Start([this, frame, wall, picture = std::move(picture), film = std::move(film),
+                    truth = std::move(truth)] {
+      WriteImage(FrameFile(options_.folder, frame, "color.png"), picture);
+      if (scene_.truth.c3vd) WriteC3vd(frame, *truth);
+      if (!scene_.truth.exact.empty()) WriteExact(frame, film, *truth);
+      if (Wants("mesh")) WriteMesh(options_.folder / "exact" / ExactName(frame, "_mesh.ply"), wall->mesh());
+    });
   }
 
   FrameTruth TruthOf(int frame, const WallMoment& wall) {
@@ -298,6 +304,7 @@ class Renderer {
   std::optional<FaceVisibility> visibility_;  // if it is asked for
   std::vector<int> frames_;                   // to render, ascending
   RenderResult result_;
+  BackgroundWork writing_;  // of the frame before; last, for it refers to what is above
 };
 
 }  // namespace

@@ -344,10 +344,13 @@ TEST_P(RayLossGradient, MatchesFiniteDifferences) {
   analytic();
   for (size_t i = color_end - 123; i < parameters.size(); ++i) compare(i);  // 10·(5 + 3) + 10 + 3·10 + 3
   // Nor do they push the level, which the last biases set.
-  EXPECT_GT(std::abs(gradient[color_end - 100] - without[color_end - 100]), 1e-6);
+  double pulled = 0;  // a single weight may belong to a unit that is off everywhere
+  for (size_t i = color_end - 123; i < color_end - 3; ++i)
+    pulled = std::max(pulled, std::abs(gradient[i] - without[i]));
+  EXPECT_GT(pulled, 1e-6);
   for (size_t i = color_end - 3; i < color_end; ++i) EXPECT_NEAR(gradient[i], without[i], 1e-12);
-  EXPECT_NEAR(gradient.back(), without.back(), 1e-12);
   if (!field.has_ambient()) return;
+  for (size_t i = gradient.size() - 3; i < gradient.size(); ++i) EXPECT_NEAR(gradient[i], without[i], 1e-12);
   // Channels weighted by trust: the gradient is that of each channel alone times its weight, which the losses
   // of a channel alone say.
   settings.albedo_weight = settings.ambient_weight = settings.eikonal_weight = 0;

@@ -54,6 +54,38 @@ TEST_F(Parallel, EveryIndexRunsOnce) {
   }
 }
 
+TEST_F(Parallel, BackgroundPiecesRunInTheirOrderAndAllOfThem) {
+  for (const int threads : {1, 2, 5}) {
+    SetThreadCount(threads);
+    std::vector<int> done;
+    {
+      BackgroundWork work;
+      for (int i = 0; i < 20; ++i) {
+        work.Start([i, &done] { done.push_back(i); });
+        std::atomic<int> beside = 0;
+        ParallelFor(0, 100, [&](int64_t) { ++beside; });
+        EXPECT_EQ(beside, 100);
+      }
+    }
+    ASSERT_EQ(done.size(), 20u) << threads;
+    for (int i = 0; i < 20; ++i) EXPECT_EQ(done[i], i);
+  }
+}
+
+TEST_F(Parallel, BackgroundPieceThatThrowsStopsTheNext) {
+  for (const int threads : {1, 2}) {
+    SetThreadCount(threads);
+    BackgroundWork work;
+    bool next_ran = false;
+    work.Start([] { throw std::range_error("disk"); });
+    EXPECT_THROW(work.Start([&] { next_ran = true; }), std::range_error);
+    EXPECT_FALSE(next_ran);
+    work.Start([] { throw std::range_error("disk"); });
+    EXPECT_THROW(work.Finish(), std::range_error);
+    work.Finish();
+  }
+}
+
 TEST_F(Parallel, ExceptionsOfABodyAreRethrown) {
   for (const int threads : {1, 2, 0}) {
     SetThreadCount(threads);

@@ -14,7 +14,7 @@ namespace lumen {
 template <class T>
 class DirectionMap {
  public:
-  static constexpr int kEdge = 16, kCells = kEdge * kEdge;
+  static constexpr int kEdge = 32, kCells = kEdge * kEdge;
 
   // Unit direction of the middle of a cell.
   static Vec3<T> Direction(int cell) {

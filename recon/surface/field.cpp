@@ -22,7 +22,7 @@ MlpShape AmbientShape(const FieldOptions& options) {
   const bool none =
       options.interreflection == Interreflection::kNone || options.reflectance != Reflectance::kLambertian;
   if (none) return {0, {}, 0, Activation::kSquareplus};
-  return {3, options.ambient_hidden, 1, Activation::kSquareplus};
+  return {3, options.ambient_hidden, 3, Activation::kSquareplus};
 }
 
 // The distance network starts close to nothing, so that training starts from the initial surface; colours
@@ -32,9 +32,9 @@ constexpr double kColorStart = 0.1;
 
 // Log of the ambient factor at the start. The mean of what a camera sees is what a place receives in a closed
 // cavity that is seen whole (the integrating sphere); a lumen is open and unevenly lit, so less of it.
-// Radiosity starts with a thirtieth of itself: what the first, wrong surface would send itself holds that
-// surface where it is, and from below the factor finds its level within some hundred steps.
-constexpr double kMeanStart = -1, kRadiosityStart = -3.5;
+// Radiosity starts as it is: while a wall's share of other walls' light is taken for nothing it looks lit from
+// nearer, and a far one that has been brought nearer hardly goes back.
+constexpr double kMeanStart = -1, kRadiosityStart = 0;
 
 }  // namespace
 
@@ -65,8 +65,9 @@ void Field<T>::Initialise(uint64_t seed, T* parameters) const {
   if (!has_ambient()) return;
   T* ambient = parameters + grid_size() + sdf_.parameter_count() + color_.parameter_count();
   ambient_.Initialise(seed * 3 + 3, kColorStart, ambient);
-  ambient[ambient_.parameter_count() - 1] =
-      static_cast<T>(options_.interreflection == Interreflection::kRadiosity ? kRadiosityStart : kMeanStart);
+  const double start =
+      options_.interreflection == Interreflection::kRadiosity ? kRadiosityStart : kMeanStart;
+  std::fill_n(ambient + ambient_.parameter_count() - 3, 3, static_cast<T>(start));  // the outputs' biases
 }
 
 template <class T>
@@ -204,7 +205,7 @@ void Field<T>::Color(const T* parameters, SurfacePass* pass) const {
     std::copy(place, place + 3 * kTile, pass->ambient_input.Tile(tile));
   }
   ambient_.Forward(parameters + grid_size() + sdf_.parameter_count() + color_.parameter_count(),
-                   pass->ambient_input, 1, Mlp<T>::Keep::kSlopes, &pass->ambient);
+                   pass->ambient_input, 3, Mlp<T>::Keep::kSlopes, &pass->ambient);
 }
 
 template <class T>

@@ -92,7 +92,7 @@ class Field {
     Panel<T> gradient_delta;  // in: ∂loss/∂gradient, 3 rows
     Panel<T> normal;          // in, before Color: unit normals, 3 rows
     Panel<T> color_delta;     // in: ∂loss/∂colour network's outputs, 3 rows
-    Panel<T> ambient_delta;   // in, if the field has_ambient: ∂loss/∂ambient_output, 1 row
+    Panel<T> ambient_delta;   // in, if the field has_ambient: ∂loss/∂ambient_output, 3 rows
     Panel<T> normal_delta;    // out of ColorBackward, 3 rows: 0 for networks that don't see the normal
     // Between the passes:
     Panel<T> input, jacobian, output_delta, direction, scaled_direction, input_delta, color_input,

@@ -1,25 +1,23 @@
-// Interreflection by radiosity: the wall around a camera as a few hundred Lambertian patches, one in each of
-// the directions from the camera, and the light that these send each other.
+// Interreflection by radiosity: the wall around a camera as patches, one in each of the directions from the camera,
+// and the light that these send each other.
 #pragma once
 
 #include <vector>
 
-#include "common/math.h"
+#include "recon/surface/gather.h"
 
 namespace lumen {
 
-struct Patch {
-  Vec3d point, normal;  // mm; unit, into the lumen
-  double area_mm2;
-  Vec3d albedo;
-  Vec3d irradiance;  // from the light guides
-};
-
-// The irradiance, RGB, that each patch receives from all the others, bounced any number of times. Between two
-// patches goes cosθ cosθ' A / (π d² + A) of what leaves a white one (a disc seen from its axis: never more
-// than all), and where they would give a patch more than the whole hemisphere they are scaled to it. All
-// patches are taken to see each other: they all see the camera. Albedos count as at most kPalest.
+// The irradiance, RGB, that each patch receives from all the others (Gather), bounced any number of times.
+// Albedos count as at most kPalest.
 std::vector<Vec3d> InterreflectedIrradiance(const std::vector<Patch>& patches);
+
+// The same of many patches at the price of few: patch i is a part of group[i] (0 … groups − 1, none empty), and only
+// the light that comes to a patch for the last time comes from single patches (as in two-level radiosity,
+// Cohen et al. 1986, "An efficient radiosity approach for realistic image synthesis", where receivers, not
+// senders, are the finer ones). In float.
+std::vector<Vec3d> InterreflectedIrradiance(const std::vector<Patch>& patches, const std::vector<int>& group,
+                                            int groups);
 
 // An enclosure that swallowed nothing would shine without bound. At .95 it multiplies the first bounce by 20
 // at most, and no mucosa is paler.

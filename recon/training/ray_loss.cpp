@@ -97,12 +97,12 @@ void RayLoss<T>::ShadeActive(const T* parameters, const RayBatch<T>& batch,
     Vec3<T> ambient = Vec3<T>::Zero();
     if (lights[frame].surroundings) {
       const auto& light = lights[frame];
-      ambient = std::exp(surface_.ambient_output().At(0, i)) *
-                light.surroundings->At(light.camera_from_field * batch.rays[sample.ray].direction);
+      ambient = light.surroundings->At(light.camera_from_field * batch.rays[sample.ray].direction);
+      for (int c = 0; c < 3; ++c) ambient[c] *= std::exp(surface_.ambient_output().At(c, i));
     } else if (field_->has_ambient()) {
       // What the pixels show of the other places holds the frame's gain already.
-      const T factor = T(kPi) * std::exp(surface_.ambient_output().At(0, i) - log_gain[frame]);
-      ambient = factor * lights[frame].mean_radiance;
+      ambient = T(kPi) * lights[frame].mean_radiance;
+      for (int c = 0; c < 3; ++c) ambient[c] *= std::exp(surface_.ambient_output().At(c, i) - log_gain[frame]);
     }
     shading_[i] =
         Shade(field_->options().reflectance, Vec3<T>(output.At(0, i), output.At(1, i), output.At(2, i)),
@@ -153,7 +153,7 @@ void RayLoss<T>::BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& 
   surface_.value_delta.SetZero();
   surface_.gradient_delta.SetZero();
   surface_.color_delta.SetZero();
-  surface_.ambient_delta.Resize(1, tiles);
+  surface_.ambient_delta.Resize(3, tiles);
   surface_.ambient_delta.SetZero();
   weight_delta_.assign(weight_.size(), T(0));
   distance_delta_.resize(weight_.size());
@@ -164,7 +164,7 @@ void RayLoss<T>::BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& 
     weight_delta_[size_t(sample.ray) * n + sample.sample] = delta.dot(shading_[i].radiance);
     for (int c = 0; c < 3; ++c) {
       surface_.color_delta.At(c, i) = delta[c] * sample.weight * shading_[i].by_output[c];
-      surface_.ambient_delta.At(0, i) += delta[c] * sample.weight * shading_[i].ambient[c];
+      surface_.ambient_delta.At(c, i) = delta[c] * sample.weight * shading_[i].ambient[c];
     }
   }
   if (settings.albedo_weight > 0) {
@@ -175,8 +175,11 @@ void RayLoss<T>::BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& 
     }
   }
   if (field_->has_ambient()) {
-    terms->ambient = Pull(settings.ambient_weight * settings.per_ray, settings.albedo_width,
-                          surface_.ambient_output(), 0, &surface_.ambient_delta);
+    const T strength = settings.ambient_weight * settings.per_ray / 3;
+    for (int c = 0; c < 3; ++c) {
+      terms->ambient +=
+          Pull(strength, settings.albedo_width, surface_.ambient_output(), c, &surface_.ambient_delta);
+    }
   }
   for (size_t r = 0; r < batch.rays.size(); ++r) {
     RayWeightsBackward(n, &signed_distance_[r * n], settings.sharpness, &transmittance_[r * n],

@@ -12,11 +12,20 @@ namespace {
 // place says little, and it would outweigh all others.
 constexpr double kShallowestCosine = 0.25;
 
+constexpr int kCells = DirectionMap<float>::kCells, kEdge = DirectionMap<float>::kEdge;
+
+// Light bounces between the cells' squares of so many by so many.
+constexpr int kGroupEdge = 2, kGroups = kCells / (kGroupEdge * kGroupEdge);
+static_assert(kEdge % kGroupEdge == 0);
+
+int GroupOf(int cell) {
+  return cell / kEdge / kGroupEdge * (kEdge / kGroupEdge) + cell % kEdge / kGroupEdge;
+}
+
 }  // namespace
 
 DirectionMap<float> SurroundingsOf(const Field<float>& field, const float* parameters,
                                    const TrainOptions::Sampling& sampling, const FrameLight<float>& light) {
-  constexpr int kCells = DirectionMap<float>::kCells;
   RayBatch<float> batch;
   batch.rays.resize(kCells);
   for (int cell = 0; cell < kCells; ++cell) {
@@ -32,6 +41,7 @@ DirectionMap<float> SurroundingsOf(const Field<float>& field, const float* param
     return Vec3f(panel.At(0, i), panel.At(1, i), panel.At(2, i));
   };
   std::vector<Patch> patches(kCells);
+  std::vector<int> group(kCells);
   for (int i = 0; i < kCells; ++i) {
     const Vec3f gradient = vector(pass.gradient, i), point = vector(pass.positions, i);
     const float length = gradient.norm();
@@ -46,8 +56,9 @@ DirectionMap<float> SurroundingsOf(const Field<float>& field, const float* param
     patch.irradiance =
         kPi * Shade<float>(Reflectance::kLambertian, Vec3f::Zero(), normal, light, point, Vec3f::Zero())
                   .radiance.cast<double>();
+    group[i] = GroupOf(i);
   }
-  const std::vector<Vec3d> irradiance = InterreflectedIrradiance(patches);
+  const std::vector<Vec3d> irradiance = InterreflectedIrradiance(patches, group, kGroups);
   DirectionMap<float> map;
   for (int i = 0; i < kCells; ++i) map.values[i] = irradiance[i].cast<float>();
   return map;
