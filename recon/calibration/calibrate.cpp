@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/error.h"
+#include "common/parallel.h"
 #include "common/progress.h"
 #include "common/statistics.h"
 #include "recon/calibration/bounced_light.h"
@@ -57,6 +58,14 @@ class Calibrator {
     return halves;
   }
 
+  std::vector<GainFit> FitHalves(const GainFitOptions& options, const GainFit& whole) const {
+    const std::vector<GainFitOptions> halves = Halves(options);
+    std::vector<GainFit> fits(halves.size());
+    ParallelFor(0, static_cast<int64_t>(halves.size()),
+                [&](int64_t i) { fits[i] = FitHalf(halves[i], whole); });
+    return fits;
+  }
+
   // The fit of a half, or the whole's where frames of it are left without company.
   GainFit FitHalf(const GainFitOptions& half, const GainFit& whole) const {
     try {
@@ -77,10 +86,9 @@ class Calibrator {
     const GainFit whole = FitHalf(options, result->fit);
     std::array<Estimate, 2> found = spread_and_gamma(whole);
     std::array<double, 2> variance{};
-    const std::vector<GainFitOptions> halves = Halves(options);
+    const std::vector<GainFit> halves = FitHalves(options, whole);
     for (size_t i = 0; i < halves.size(); i += 2) {
-      const auto one = spread_and_gamma(FitHalf(halves[i], whole));
-      const auto other = spread_and_gamma(FitHalf(halves[i + 1], whole));
+      const auto one = spread_and_gamma(halves[i]), other = spread_and_gamma(halves[i + 1]);
       for (int k = 0; k < 2; ++k) variance[k] += std::pow((one[k].value - other[k].value) / 2, 2);
     }
     for (int k = 0; k < 2; ++k)
@@ -109,11 +117,10 @@ class Calibrator {
                        ": the places that frames share don't tell their gains; check poses and light");
     }
     Eigen::VectorXd variance = result->fit.log_gain_error.array().square();
-    const std::vector<GainFitOptions> halves = Halves(options);
+    const std::vector<GainFit> halves = FitHalves(options, result->fit);
     for (size_t i = 0; i < halves.size(); i += 2) {
-      const Eigen::VectorXd one = FitHalf(halves[i], result->fit).wall.log_gain;
-      const Eigen::VectorXd other = FitHalf(halves[i + 1], result->fit).wall.log_gain;
-      variance.array() += (one - other).array().square() / 4;
+      const Eigen::VectorXd difference = halves[i].wall.log_gain - halves[i + 1].wall.log_gain;
+      variance.array() += difference.array().square() / 4;
     }
     for (Eigen::Index f = 0; f < gains.size(); ++f)
       result->log_gain.push_back({gains[f], std::sqrt(variance[f])});

@@ -52,7 +52,7 @@ TrainingFrames::TrainingFrames(const Sequence& sequence, int count, bool lit, si
     const Image8 color = ReadColor(sequence, source);
     Frame frame;
     frame.gain = source.gain.value_or(1.0);
-    frame.log_gain_reach = source.gain ? 3 * source.log_gain_error.value_or(0.0) : INFINITY;
+    frame.log_gain_reach = source.gain ? source.log_gain_error.value_or(0.0) : INFINITY;
     gains_known_ = gains_known_ && source.gain.has_value() && !source.log_gain_error;
     frame.rgb.reserve(pixels.size() * 3);
     for (size_t pixel : pixels) {
