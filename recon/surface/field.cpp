@@ -32,9 +32,10 @@ constexpr double kColorStart = 0.1;
 
 // Log of the ambient factor at the start. The mean of what a camera sees is what a place receives in a closed
 // cavity that is seen whole (the integrating sphere); a lumen is open and unevenly lit, so less of it.
-// Radiosity starts as it is: while a wall's share of other walls' light is taken for nothing it looks lit from
-// nearer, and a far one that has been brought nearer hardly goes back.
-constexpr double kMeanStart = -1, kRadiosityStart = 0;
+// Radiosity starts with a thirtieth of itself: what the first, wrong surface would send itself holds that
+// surface where it is, and from below the factor finds its level within some hundred steps. Where the frames'
+// colours say that there is such light, training starts with all of it.
+constexpr double kMeanStart = -1, kRadiosityStart = -3.5;
 
 }  // namespace
 
@@ -67,7 +68,7 @@ void Field<T>::Initialise(uint64_t seed, T* parameters) const {
   ambient_.Initialise(seed * 3 + 3, kColorStart, ambient);
   const double start =
       options_.interreflection == Interreflection::kRadiosity ? kRadiosityStart : kMeanStart;
-  std::fill_n(ambient + ambient_.parameter_count() - 3, 3, static_cast<T>(start));  // the outputs' biases
+  std::fill_n(parameters + ambient_bias_begin(), 3, static_cast<T>(start));
 }
 
 template <class T>

@@ -70,6 +70,8 @@ class Field {
   size_t color_bias_begin() const {
     return grid_size() + sdf_.parameter_count() + color_.parameter_count() - 3;
   }
+  // Likewise of the ambient network's, if the field has_ambient.
+  size_t ambient_bias_begin() const { return parameter_count() - 3; }
   bool has_ambient() const { return ambient_.parameter_count() > 0; }
 
   // Signed distances alone, of all tiles of positions.

@@ -5,6 +5,7 @@
 
 #include "common/parallel.h"
 #include "common/random.h"
+#include "recon/training/hue_slope.h"
 #include "recon/training/initial_reach.h"
 #include "recon/training/march.h"
 #include "recon/training/surroundings.h"
@@ -82,6 +83,11 @@ Trainer::Trainer(const TrainingFrames& frames, const TrainOptions& options, uint
   }
   field_->Initialise(seed, state_.parameters.data());
   norm_.Initialise(state_.parameters.data());
+  // While a wall's share of other walls' light is taken for nothing it looks lit from nearer, and a far one that has
+  // been brought nearer hardly goes back. A single frame has no parallax to tell its depth apart from its share.
+  if (has_surroundings() && frames.size() > 1 && frames.hue_slope() < kHueSlopeOfWallLight) {
+    std::fill_n(&state_.parameters[field_->ambient_bias_begin()], 3, 0.0f);
+  }
   if (options.field.reflectance != Reflectance::kUnlit) MatchColorsToInitialSurface(initial);
 }
 

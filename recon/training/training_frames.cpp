@@ -7,6 +7,7 @@
 #include "common/error.h"
 #include "common/parallel.h"
 #include "common/random.h"
+#include "recon/training/hue_slope.h"
 #include "recon/training/plausible.h"
 
 namespace lumen {
@@ -45,11 +46,14 @@ TrainingFrames::TrainingFrames(const Sequence& sequence, int count, bool lit, si
   if (pixels.empty()) throw InputError(sequence.folder.string() + ": no pixel carries image; check the mask");
   for (int i = 0; i < 256; ++i) decoded_[i] = static_cast<float>(Decode(calibration_.response, i / 255.0));
 
+  const Image8 valid = ValidPixels(calibration_);
+  HueSlope hue;
   for (int i = 0; i < taken; ++i) {
     const int index =
         taken > 1 ? static_cast<int>(std::lround(double(i) * (available - 1) / (taken - 1))) : 0;
     const SequenceFrame& source = sequence.frames[index];
     const Image8 color = ReadColor(sequence, source);
+    if (lit_) hue.Add(color, valid, calibration_.response);
     Frame frame;
     frame.gain = source.gain.value_or(1.0);
     frame.log_gain_reach = source.gain ? source.log_gain_error.value_or(0.0) : INFINITY;
@@ -62,6 +66,7 @@ TrainingFrames::TrainingFrames(const Sequence& sequence, int count, bool lit, si
     numbers_.push_back(source.number);
     poses_.push_back(source.world_from_camera);
   }
+  hue_slope_ = hue.Slope();
   CheckPoses(sequence.folder, numbers_, poses_);
   if (lit_) FindScale(sequence);
 }

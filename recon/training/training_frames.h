@@ -41,6 +41,8 @@ class TrainingFrames {
   // estimate, for a drift of the gains can make up for a far wall that is still too near, and training left to itself
   // strays that way; infinite where it says nothing, 0 where it knows.
   double LogGainReach(int frame) const;
+  // Over the frames taken (HueSlope).
+  double hue_slope() const { return hue_slope_; }
   // 1/γ of the comparison; for an sRGB response that of the 2.2 which approximates it.
   double inverse_gamma() const;
 
@@ -66,6 +68,7 @@ class TrainingFrames {
   Calibration calibration_;
   bool lit_;
   bool gains_known_ = true;
+  double hue_slope_ = 0;
   std::vector<int> numbers_;
   std::vector<Pose> poses_;
   std::vector<Frame> frames_;

@@ -1,0 +1,38 @@
+// Whether light goes from wall to wall, as colours tell it.
+//
+// Direct light has the wall's hue everywhere. What has been sent from wall to wall has met the wall's colour
+// twice or more, and its share grows towards the dark far end: there, a red wall is redder.
+#pragma once
+
+#include <array>
+
+#include "common/image.h"
+#include "common/response.h"
+
+namespace lumen {
+
+class HueSlope {
+ public:
+  // Adds a colour frame: of squares of pixels that all carry image, the mean linear values, saturated pixels left
+  // out. valid: 0 where there is no image.
+  void Add(const Image8& color, const Image8& valid, const Response& response);
+
+  // d log(x/y) / d log y within the frames, x being the channel with the most light and y that with the least: 0
+  // under direct light alone, negative where light goes from wall to wall (and somewhat where a coat mirrors white
+  // light). 0 for a grey wall, which has no hue to tell it by, and for too few squares.
+  double Slope() const;
+
+ private:
+  // Of log(x/y) and log y, by channels x, y; about each frame's own means.
+  struct Sums {
+    double xx = 0, xy = 0;
+  };
+  std::array<std::array<Sums, 3>, 3> sums_{};
+  std::array<double, 3> log_value_{};
+};
+
+// Of 22 twins of C3VD's trajectories and nine other scenes, those of direct light have slopes within ±.009, those with
+// light between walls below −.1; mottling, vessels and noise are in both.
+inline constexpr double kHueSlopeOfWallLight = -0.03;
+
+}  // namespace lumen
