@@ -20,14 +20,15 @@ void ParallelFor(int64_t begin, int64_t end, const std::function<void(int64_t)>&
 void ParallelChunks(int64_t begin, int64_t end, int64_t grain,
                     const std::function<void(int64_t, int64_t)>& body);
 
-// Work that the loops' threads do beside whatever else there is to do: one piece at a time, in the order in which
-// the pieces come. With one thread a piece is done when the next comes.
+// Work that the loops' threads do beside whatever else there is to do: one piece at a time, in the order in
+// which the pieces come. With one thread a piece is done when the next comes.
 class BackgroundWork {
  public:
   BackgroundWork();
   ~BackgroundWork();  // waits; what the last piece throws is lost
 
-  // Waits for the piece before and starts this one. Rethrows what the one before threw; then this one isn't begun.
+  // Waits for the piece before and starts this one. Rethrows what the one before threw; then this one isn't
+  // begun.
   void Start(std::function<void()> piece);
   // Waits for the last piece and rethrows what it threw.
   void Finish();

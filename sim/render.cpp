@@ -142,7 +142,7 @@ class Renderer {
     if (scene_.truth.c3vd || !scene_.truth.exact.empty()) truth = TruthOf(frame, *wall);
     NoteSeen(frame, *wall);
     if (scene_.truth.exact.empty()) film = {};
-    // Compressing takes one thread, as long as half of a frame of direct light does.
+    // Compressing keeps one thread busy; it can be done beside the next frame.
     writing_.Start([this, frame, wall, picture = std::move(picture), film = std::move(film),
                     truth = std::move(truth)] {
       WriteImage(FrameFile(options_.folder, frame, "color.png"), picture);

@@ -14,17 +14,17 @@ struct Patch {
   Vec3d irradiance;  // from the light guides
 };
 
-// What share of what leaves `from` the irradiance at `to` has, if they see each other: cosθ cosθ' A / (π d² + A),
-// a disc seen from its axis: never more than all. 0 where either is turned away, and of a patch for itself.
+// What share of what leaves `from` the irradiance at `to` has, if they see each other: cosθ cosθ' A /
+// (π d² + A), a disc seen from its axis: never more than all. 0 where either is turned away, and of a patch for
+// itself.
 double FormFactor(const Patch& to, const Patch& from);
 
-// The irradiance, RGB, that each patch receives from all others, of which `leaving` is sent (radiosity, a patch).
-// All see each other: they all see the camera. Where they would give a patch more than the whole hemisphere
-// they are scaled to it.
+// The irradiance, RGB, that each patch receives from all others, of which `leaving` is sent (radiosity, a
+// patch). All see each other: they all see the camera. Where they would give a patch more than the whole
+// hemisphere they are scaled to it.
 std::vector<Vec3d> Gather(const std::vector<Patch>& patches, const std::vector<Vec3d>& leaving);
 
-// The same in float, sixteen patches at a time: within 1e-5 of each patch's own where lengths are below 1e3 mm and
-// patches at least 1e-3 of that apart.
+// The same in float, sixteen patches at a time: for places up to some 100 mm apart within 2e-5 of it.
 std::vector<Vec3d> GatherInLanes(const std::vector<Patch>& patches, const std::vector<Vec3d>& leaving);
 
 }  // namespace lumen

@@ -1,5 +1,5 @@
-// Interreflection by radiosity: the wall around a camera as patches, one in each of the directions from the camera,
-// and the light that these send each other.
+// Interreflection by radiosity: the wall around a camera as patches, one in each of the directions from the
+// camera, and the light that these send each other.
 #pragma once
 
 #include <vector>
@@ -12,10 +12,10 @@ namespace lumen {
 // Albedos count as at most kPalest.
 std::vector<Vec3d> InterreflectedIrradiance(const std::vector<Patch>& patches);
 
-// The same of many patches at the price of few: patch i is a part of group[i] (0 … groups − 1, none empty), and only
-// the light that comes to a patch for the last time comes from single patches (as in two-level radiosity,
-// Cohen et al. 1986, "An efficient radiosity approach for realistic image synthesis", where receivers, not
-// senders, are the finer ones). In float.
+// The same of many patches at the price of few: patch i is a part of group[i] (0 … groups − 1, none empty), and
+// only the light that comes to a patch for the last time comes from single patches (compare Cohen et al. 1986,
+// "An efficient radiosity approach for realistic image synthesis", where receivers alone are the finer ones).
+// The last gathering is in float.
 std::vector<Vec3d> InterreflectedIrradiance(const std::vector<Patch>& patches, const std::vector<int>& group,
                                             int groups);
 

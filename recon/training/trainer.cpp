@@ -83,8 +83,8 @@ Trainer::Trainer(const TrainingFrames& frames, const TrainOptions& options, uint
   }
   field_->Initialise(seed, state_.parameters.data());
   norm_.Initialise(state_.parameters.data());
-  // While a wall's share of other walls' light is taken for nothing it looks lit from nearer, and a far one that has
-  // been brought nearer hardly goes back. A single frame has no parallax to tell its depth apart from its share.
+  // While a wall's share of other walls' light is taken for nothing it looks lit from nearer, and a far one that
+  // has been brought nearer hardly goes back. A single frame has no parallax to tell its depth from its share.
   if (has_surroundings() && frames.size() > 1 && frames.hue_slope() < kHueSlopeOfWallLight) {
     std::fill_n(&state_.parameters[field_->ambient_bias_begin()], 3, 0.0f);
   }

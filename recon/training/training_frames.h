@@ -37,9 +37,9 @@ class TrainingFrames {
   const std::vector<Vec3f>& pixel_rays() const { return rays_; }
   // Of every frame, and for good.
   bool gains_known() const { return gains_known_; }
-  // By how much the logarithm of a frame's gain may be off from what the sequence says: one standard error of an
-  // estimate, for a drift of the gains can make up for a far wall that is still too near, and training left to itself
-  // strays that way; infinite where it says nothing, 0 where it knows.
+  // By how much the logarithm of a frame's gain may be off from what the sequence says: one standard error of
+  // an estimate, for a drift of the gains can make up for a far wall that is still too near, and training left
+  // to itself strays that way; infinite where it says nothing, 0 where it knows.
   double LogGainReach(int frame) const;
   // Over the frames taken (HueSlope).
   double hue_slope() const { return hue_slope_; }
