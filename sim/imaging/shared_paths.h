@@ -7,10 +7,10 @@
 //   ρ_i · L(y_k → x_i) · g_i(y_k) / (K/n · Σ_j g_j(y_k)),
 //
 // at most n/K · ρ_i L. A join takes n shadow rays, in coherent packets, and is what costs; so of the K ends
-// only some are joined, chosen with a probability e_k and divided by it (resampled importance sampling: Talbot,
-// Cline and Egbert 2005); e_k is in proportion to the root mean square of what the n places would get, so that
-// an end close to a few of them, which would leave spots there, is joined more often. All of it is without
-// bias. Noise is smaller than with a path for each pixel, and alike in neighbouring pixels.
+// only some are joined, chosen with a probability e_k and divided by it (resampled importance sampling:
+// Talbot, Cline and Egbert 2005); e_k is in proportion to the root mean square of what the n places would
+// get, so that an end close to a few of them, which would leave spots there, is joined more often. All of it
+// is without bias. Noise is smaller than with a path for each pixel, and alike in neighbouring pixels.
 #pragma once
 
 #include <array>
@@ -94,7 +94,8 @@ class SharedPaths {
   };
 
   // What the choice of the joins goes by: the root mean square of what the places would get, shadows apart.
-  static Lanes Brightness(const FarEnds<false>& ends, const BounceStart& start, const TileSample<false>& tile) {
+  static Lanes Brightness(const FarEnds<false>& ends, const BounceStart& start,
+                          const TileSample<false>& tile) {
     Lanes brightness = LuminanceOf(ends.RadianceTo(start.direction * Broadcast(-1)));
     for (int i = 0; i < kLanes; ++i) {
       if (!ends.places.alive[i]) continue;
