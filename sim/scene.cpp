@@ -19,7 +19,7 @@ namespace {
 constexpr Range kImageSide{1, 32768};
 
 // Seeds of the parts of a scene, so that none repeats another's numbers.
-enum : uint64_t { kGeometrySeed = 1, kTrajectorySeed = 2 };
+enum : uint64_t { kGeometrySeed = 1, kTrajectorySeed = 2, kVesselSeed = 3 };
 
 CameraIntrinsics ReadSceneCamera(const ConfigTable& table) {
   if (!table.Has("preset")) return ReadCamera(table);
@@ -154,7 +154,6 @@ Scene ReadScene(const std::filesystem::path& file, const std::vector<std::string
   scene.calibration.mask = ReadMask(camera, scene.calibration.camera);
   scene.calibration.light = ReadLight(root.Table("light"));
   scene.calibration.response = ReadResponse(root.Table("response"));
-  scene.surface = ReadSurface(root.Table("surface"));
   if (const auto path = root.Optional("path")) scene.path = ReadPath(*path);
   if (const auto lens = root.Optional("lens")) {
     if (const auto table = lens->Optional("defocus")) scene.defocus = ReadDefocus(*table);
@@ -168,6 +167,7 @@ Scene ReadScene(const std::filesystem::path& file, const std::vector<std::string
   const ConfigTable trajectory = root.Table("trajectory");
   scene.geometry =
       BuildGeometry(root.Table("geometry"), RandomBits(seed, kGeometrySeed), GivenPoses(trajectory));
+  scene.surface = ReadSurface(root.Table("surface"), scene.geometry.mesh, RandomBits(seed, kVesselSeed));
   scene.world_from_camera = BuildTrajectory(trajectory, scene.geometry, RandomBits(seed, kTrajectorySeed));
   scene.path_is_stand_in = IsStandIn(trajectory);
   config.RejectUnknown();

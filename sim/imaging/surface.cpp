@@ -155,19 +155,9 @@ Lanes Clouds(uint64_t seed, float scale_mm, const Lanes3& place) {
   return (Noise(NoiseSeed(seed), scaled) + 0.5f * Noise(NoiseSeed(seed + 1), scaled * Broadcast(2))) / 1.5f;
 }
 
-// 1 on the middle of a vessel, 0 beyond its width. The noise field is bent by another one, so that vessels
-// wind; near its zero it changes by about one a lattice step, which turns its value into a distance.
-Lanes InsideVessels(const Vessels& vessels, uint64_t seed, const Lanes3& place) {
-  const Lanes3 scaled = place * Broadcast(1 / static_cast<float>(vessels.spacing_mm));
-  const Lanes bend = 0.35f * Noise(NoiseSeed(seed + 3), scaled * Broadcast(2));
-  const Lanes field = Noise(NoiseSeed(seed + 2), {scaled.x + bend, scaled.y - bend, scaled.z + bend});
-  const Lanes distance = Abs(field) * static_cast<float>(vessels.spacing_mm / vessels.width_mm);
-  return distance < 1.0f ? Quintic(1.0f - distance) : Lanes{};
-}
-
 }  // namespace
 
-Surface ReadSurface(const ConfigTable& table) {
+Surface ReadSurface(const ConfigTable& table, const Mesh& wall, uint64_t vessel_seed) {
   Surface surface;
   surface.albedo = table.Vector("albedo", surface.albedo, kFraction);
   if (const auto mottling = table.Optional("mottling")) {
@@ -176,10 +166,7 @@ Surface ReadSurface(const ConfigTable& table) {
     surface.mottling->scale_mm = mottling->Number("scale_mm", surface.mottling->scale_mm, {1e-3, 1e6});
   }
   if (const auto vessels = table.Optional("vessels")) {
-    surface.vessels.emplace();
-    surface.vessels->spacing_mm = vessels->Number("spacing_mm", surface.vessels->spacing_mm, {1e-3, 1e6});
-    surface.vessels->width_mm = vessels->Number("width_mm", surface.vessels->width_mm, {1e-4, 1e6});
-    surface.vessels->absorption = vessels->Vector("absorption", surface.vessels->absorption, {0, 50});
+    surface.vessels.emplace(ReadVessels(*vessels, wall, vessel_seed));
   }
   if (const auto subsurface = table.Optional("subsurface")) {
     surface.subsurface.emplace(ReadSubsurface(*subsurface));
@@ -227,12 +214,12 @@ Lanes3 AlbedoAt(const Surface& surface, uint64_t seed, const Lanes3& places_mm) 
     albedo = albedo * Exp(contrast * Clouds(seed, static_cast<float>(surface.mottling->scale_mm), places_mm));
   }
   if (surface.vessels) {
-    const Lanes inside = InsideVessels(*surface.vessels, seed, places_mm);
-    if (Any(inside > 0.0f)) {
-      const Vec3f absorption = surface.vessels->absorption.cast<float>();
-      albedo.x *= Exp(-absorption[0] * inside);
-      albedo.y *= Exp(-absorption[1] * inside);
-      albedo.z *= Exp(-absorption[2] * inside);
+    const Lanes blood = surface.vessels->BloodAt(places_mm);
+    if (Any(blood > 0.0f)) {
+      const Vec3f absorption = surface.vessels->options().absorption.cast<float>();
+      albedo.x *= Exp(-absorption[0] * blood);
+      albedo.y *= Exp(-absorption[1] * blood);
+      albedo.z *= Exp(-absorption[2] * blood);
     }
   }
   const Lanes one = Broadcast(1);

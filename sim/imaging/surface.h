@@ -1,5 +1,6 @@
 // What the mucosa does with light: a Lambertian wall whose albedo is a solid texture of place, with blood
-// vessels, or tissue below such a texture (subsurface.h), under a coat of mucus if there is one (coat.h).
+// vessels (vessels.h), or tissue below such a texture (subsurface.h), under a coat of mucus if there is one
+// (coat.h).
 #pragma once
 
 #include <cstdint>
@@ -8,9 +9,11 @@
 #include "common/config.h"
 #include "common/lanes.h"
 #include "common/math.h"
+#include "common/mesh.h"
 #include "common/random.h"
 #include "sim/imaging/coat.h"
 #include "sim/imaging/subsurface.h"
+#include "sim/imaging/vessels.h"
 
 namespace lumen {
 
@@ -18,13 +21,6 @@ namespace lumen {
 struct Mottling {
   double contrast = 0.2;
   double scale_mm = 8;  // of its coarsest pattern
-};
-
-// Vessels: curves where a noise field crosses 0; in them the albedo is multiplied by exp(−absorption).
-struct Vessels {
-  double spacing_mm = 9;
-  double width_mm = 0.6;
-  Vec3d absorption = Vec3d(0.15, 0.7, 0.5);  // haemoglobin absorbs green and blue, hardly red
 };
 
 struct Surface {
@@ -36,15 +32,15 @@ struct Surface {
   std::optional<Coat> bounced_coat;  // that paths meet after a bounce; none: the same
 };
 
-// Reads the scene's [surface].
-Surface ReadSurface(const ConfigTable& surface);
+// Reads the scene's [surface]; vessels grow on the resting wall, from a seed of their own.
+Surface ReadSurface(const ConfigTable& surface, const Mesh& wall, uint64_t vessel_seed);
 
 // Smooth noise in ±1 at a point, period-free, a function of seed (Perlin 2002: gradients at the integer
 // lattice, quintic interpolation).
 float GradientNoise(uint64_t seed, const Vec3f& point);
 
-// The noise fields of a surface have seeds of their own: mottling the surface's seed and the next, vessels
-// the two after, then the coat's relief two.
+// The noise fields of a surface have seeds of their own: mottling the surface's seed and the next, the coat's
+// relief two from here on.
 inline constexpr uint64_t kReliefSeeds = 4;
 
 // The same in each lane, bit for bit.

@@ -1,0 +1,448 @@
+#include "sim/imaging/vessel_growth.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <unordered_map>
+
+#include "common/error.h"
+#include "common/random.h"
+
+namespace lumen {
+namespace {
+
+// In spacings: between roots; length of a trunk; between the places that draw, coarse first; a step.
+constexpr double kRootDistance = 4, kTrunk = 1.6, kDrawingDistances[] = {1.6, 0.9, 0.5}, kStep = 0.1;
+// In distances between places that draw: from how far one draws, how near satisfies it, between a node's
+// forks along a vessel.
+constexpr double kInfluence = 2.5, kReach = 0.5, kInternode = 0.5;
+// mm: a step is straight, and the folds of a colon are 5 mm thick.
+constexpr double kLongestStep_mm = 0.75;
+// How much of a step's direction is the last one's, and how far it may turn by chance, about rad.
+constexpr double kInertia = 0.6, kWander = 0.5;
+// Rounds without getting nearer that a place goes on drawing: others that draw at its node may turn first.
+constexpr int kPatience = 6;
+// In steps: side branches that are shorter than this are left out, and a vessel's path is smoothed so often.
+constexpr int kShortestBranch = 3, kSmoothings = 3;
+// Some 100 bytes each.
+constexpr double kMostPlaces = 2e6, kMostParts = 4096;
+
+// Which numbers are drawn.
+enum : uint64_t { kRankNumber = 3, kDirectionNumber, kWanderNumber };
+
+// A place of the wall with its smooth normal.
+struct WallPlace {
+  Vec3d place_mm, normal;
+  uint64_t rank = 0;  // random
+};
+
+// Through a fold the wall turns its back.
+bool FacesAlike(const Vec3d& a, const Vec3d& b) { return a.dot(b) > 0; }
+
+Vec3d Along(const Vec3d& normal, const Vec3d& direction) {
+  return direction - normal * normal.dot(direction);
+}
+
+// The cube of a lattice that a place lies in, as one number.
+Vec3i CubeOf(const Vec3d& place_mm, double side_mm) {
+  return (place_mm / side_mm).array().floor().cast<int>();
+}
+uint64_t KeyOf(const Vec3i& cube) {
+  constexpr uint64_t kMask = (1 << 21) - 1;
+  return (static_cast<uint64_t>(cube[0]) & kMask) << 42 | (static_cast<uint64_t>(cube[1]) & kMask) << 21 |
+         (static_cast<uint64_t>(cube[2]) & kMask);
+}
+
+// Items by the cubes that they lie in.
+class CubeMap {
+ public:
+  explicit CubeMap(double reach_mm) : side_mm_(2 * reach_mm) {}
+
+  void Add(const Vec3d& place_mm, int item) { items_[KeyOf(CubeOf(place_mm, side_mm_))].push_back(item); }
+
+  // Calls body with every item within reach of a place, and with some others: those of the eight cubes around
+  // the lattice's corner that is nearest to it.
+  template <class Body>
+  void ForEachNear(const Vec3d& place_mm, const Body& body) const {
+    const Vec3i lowest = CubeOf(place_mm - Vec3d::Constant(side_mm_ / 2), side_mm_);
+    for (int i = 0; i < 8; ++i) {
+      const auto found = items_.find(KeyOf(lowest + Vec3i(i & 1, i >> 1 & 1, i >> 2)));
+      if (found == items_.end()) continue;
+      for (const int item : found->second) body(item);
+    }
+  }
+
+ private:
+  double side_mm_;
+  std::unordered_map<uint64_t, std::vector<int>> items_;
+};
+
+// One place for each cube of the pitch's side that the wall goes through, by rank: of those looked at the
+// nearest to a random point of the cube, so that another mesh of the same wall gives nearly the same places.
+class WallSampler {
+ public:
+  WallSampler(const Mesh& wall, double pitch_mm, uint64_t seed)
+      : wall_(wall), middle_(Bounds(wall).center()), pitch_mm_(pitch_mm), seed_(seed) {}
+
+  std::vector<WallPlace> Run() {
+    const std::vector<Vec3d> normals = VertexNormals(wall_);
+    for (const Vec3i& face : wall_.faces) {
+      Mat3<double> corners, corner_normals;
+      for (int c = 0; c < 3; ++c) {
+        corners.col(c) = wall_.vertices[face[c]] - middle_;
+        corner_normals.col(c) = normals[face[c]];
+      }
+      OfferFace(corners, corner_normals);
+    }
+    std::vector<WallPlace> places;
+    places.reserve(chosen_.size());
+    for (const auto& [key, chosen] : chosen_) places.push_back(chosen.place);
+    std::sort(places.begin(), places.end(), [](const auto& a, const auto& b) { return a.rank < b.rank; });
+    return places;
+  }
+
+ private:
+  struct Chosen {
+    WallPlace place;
+    double squared_mm2;  // to the cube's random point
+  };
+
+  // The middles of equal triangles whose edges are no longer than the pitch.
+  void OfferFace(const Mat3<double>& corners, const Mat3<double>& normals) {
+    double longest_mm = 0;
+    for (int c = 0; c < 3; ++c)
+      longest_mm = std::max(longest_mm, (corners.col(c) - corners.col((c + 1) % 3)).norm());
+    const int parts = std::max(1, static_cast<int>(std::ceil(longest_mm / pitch_mm_)));
+    for (int i = 0; i < parts; ++i) {
+      for (int j = 0; i + j < parts; ++j) {
+        const double u = (i + 1.0 / 3) / parts, v = (j + 1.0 / 3) / parts;
+        const Vec3d weights(1 - u - v, u, v), normal = normals * weights;
+        if (normal.squaredNorm() > 0) Offer(corners * weights, normal.normalized());
+      }
+    }
+  }
+
+  void Offer(const Vec3d& place_mm, const Vec3d& normal) {
+    const Vec3i cube = CubeOf(place_mm, pitch_mm_);
+    const uint64_t key = KeyOf(cube);
+    Vec3d target;
+    for (int c = 0; c < 3; ++c) target[c] = pitch_mm_ * (cube[c] + UniformDouble(RandomBits(seed_, key, c)));
+    const double squared = (place_mm - target).squaredNorm();
+    const auto [entry, is_new] = chosen_.try_emplace(key);
+    if (is_new || squared < entry->second.squared_mm2)
+      entry->second = {{place_mm, normal, RandomBits(seed_, key, kRankNumber)}, squared};
+  }
+
+  const Mesh& wall_;
+  const Vec3d middle_;
+  const double pitch_mm_;
+  const uint64_t seed_;
+  std::unordered_map<uint64_t, Chosen> chosen_;
+};
+
+// The first of the places, and whichever of the later ones are no nearer than a distance to those before.
+std::vector<WallPlace> Scatter(const std::vector<WallPlace>& places, double distance_mm) {
+  std::vector<WallPlace> scattered;
+  CubeMap taken(distance_mm);
+  for (const WallPlace& place : places) {
+    bool free = true;
+    taken.ForEachNear(place.place_mm, [&](int i) {
+      free &= (scattered[i].place_mm - place.place_mm).squaredNorm() >= distance_mm * distance_mm ||
+              !FacesAlike(scattered[i].normal, place.normal);
+    });
+    if (!free) continue;
+    taken.Add(place.place_mm, static_cast<int>(scattered.size()));
+    scattered.push_back(place);
+  }
+  return scattered;
+}
+
+// The trees' nodes while they grow.
+class Growth {
+ public:
+  Growth(const Mesh& wall, double step_mm, uint64_t seed)
+      : seed_(seed),
+        step_mm_(step_mm),
+        wall_(WallSampler(wall, step_mm, seed).Run()),
+        wall_cubes_(2 * step_mm),
+        node_cubes_(step_mm) {
+    for (size_t i = 0; i < wall_.size(); ++i) wall_cubes_.Add(wall_[i].place_mm, static_cast<int>(i));
+  }
+
+  const std::vector<WallPlace>& wall() const { return wall_; }
+  const std::vector<VesselNode>& nodes() const { return nodes_; }
+  std::vector<VesselNode> TakeNodes() { return std::move(nodes_); }
+
+  int Add(const Vec3d& place_mm, const Vec3d& normal, int parent) {
+    const int node = static_cast<int>(nodes_.size());
+    nodes_.push_back({place_mm, normal, parent});
+    children_.push_back(0);
+    node_cubes_.Add(place_mm, node);
+    if (parent >= 0) ++children_[parent];
+    return node;
+  }
+
+  // A root and its trunk, in a random direction.
+  void AddTrunk(const WallPlace& root, double length_mm) {
+    int node = Add(root.place_mm, root.normal, -1);
+    const double angle = 2 * kPi * UniformDouble(RandomBits(seed_, node, kDirectionNumber));
+    const Vec3d across = root.normal.unitOrthogonal();
+    Vec3d direction = std::cos(angle) * across + std::sin(angle) * root.normal.cross(across);
+    for (double grown_mm = 0; node >= 0 && grown_mm < length_mm; grown_mm += step_mm_) {
+      node = Step(node, direction);
+      direction.setZero();  // straight on
+    }
+  }
+
+  // Vessels fork in two, and not right behind another fork.
+  bool MayGrow(int node, double internode_mm) const {
+    if (children_[node] != 1) return children_[node] == 0;
+    int before = nodes_[node].parent;
+    for (double way_mm = step_mm_; before >= 0 && way_mm < internode_mm; way_mm += step_mm_) {
+      if (children_[before] == 2) return false;
+      before = nodes_[before].parent;
+    }
+    return true;
+  }
+
+  // A node one step on: its number; −1 where there is no wall, or another vessel.
+  int Step(int from, const Vec3d& pull) {
+    const VesselNode node = nodes_[from];
+    Vec3d direction = pull;
+    if (node.parent >= 0 && children_[from] == 0)
+      direction += kInertia * (node.place_mm - nodes_[node.parent].place_mm).normalized();
+    const double turn = kWander * (2 * UniformDouble(RandomBits(seed_, nodes_.size(), kWanderNumber)) - 1);
+    direction = Along(node.normal, direction + turn * node.normal.cross(direction));
+    if (direction.squaredNorm() == 0) return -1;
+    Vec3d place_mm = node.place_mm + step_mm_ * direction.normalized();
+    const WallPlace* const wall = NearestWall(place_mm, node.normal);
+    if (!wall) return -1;
+    place_mm = wall->place_mm + Along(wall->normal, place_mm - wall->place_mm);
+    return Free(place_mm, wall->normal, from) ? Add(place_mm, wall->normal, from) : -1;
+  }
+
+ private:
+  const WallPlace* NearestWall(const Vec3d& place_mm, const Vec3d& normal) const {
+    const WallPlace* nearest = nullptr;
+    double least = std::numeric_limits<double>::infinity();
+    wall_cubes_.ForEachNear(place_mm, [&](int i) {
+      const double squared = (wall_[i].place_mm - place_mm).squaredNorm();
+      if (squared >= least || !FacesAlike(wall_[i].normal, normal)) return;
+      least = squared;
+      nearest = &wall_[i];
+    });
+    return nearest;
+  }
+
+  // Whether a child of `from` keeps almost a step away from every vessel that it doesn't come from.
+  bool Free(const Vec3d& place_mm, const Vec3d& normal, int from) const {
+    bool free = true;
+    node_cubes_.ForEachNear(place_mm, [&](int i) {
+      if (i == from || i == nodes_[from].parent || nodes_[i].parent == from) return;
+      free &= (nodes_[i].place_mm - place_mm).squaredNorm() >= 0.9 * step_mm_ * step_mm_ ||
+              !FacesAlike(nodes_[i].normal, normal);
+    });
+    return free;
+  }
+
+  const uint64_t seed_;
+  const double step_mm_;
+  const std::vector<WallPlace> wall_;
+  CubeMap wall_cubes_;
+  std::vector<VesselNode> nodes_;
+  std::vector<int> children_;  // of each node, how many
+  CubeMap node_cubes_;
+};
+
+// Lets branches grow to places scattered over the wall, so far apart.
+class Colonisation {
+ public:
+  Colonisation(double distance_mm, Growth* growth)
+      : influence_mm2_(std::pow(kInfluence * distance_mm, 2)),
+        reach_mm2_(std::pow(kReach * distance_mm, 2)),
+        internode_mm_(kInternode * distance_mm),
+        growth_(*growth),
+        drawing_cubes_(kInfluence * distance_mm),
+        node_cubes_(kInfluence * distance_mm) {
+    for (const WallPlace& place : Scatter(growth_.wall(), distance_mm)) {
+      drawing_cubes_.Add(place.place_mm, static_cast<int>(drawings_.size()));
+      drawings_.push_back({place.place_mm, place.normal, influence_mm2_});
+    }
+    for (size_t node = 0; node < growth_.nodes().size(); ++node) Note(static_cast<int>(node));
+  }
+
+  void Run() {
+    while (GrowOnce()) {
+    }
+  }
+
+ private:
+  // A place that wants blood.
+  struct Drawing {
+    Vec3d place_mm, normal;
+    double squared_mm2;  // to the nearest node that may grow
+    int nearest = -1;
+    int patience = kPatience;  // 0: it is satisfied, or can't be
+  };
+  struct Pull {
+    int node;
+    Vec3d direction;
+    std::vector<int> drawings;
+  };
+
+  bool Draws(const Drawing& drawing, int node, double* squared_mm2) const {
+    const VesselNode& at = growth_.nodes()[node];
+    *squared_mm2 = (drawing.place_mm - at.place_mm).squaredNorm();
+    return *squared_mm2 < drawing.squared_mm2 && FacesAlike(drawing.normal, at.normal);
+  }
+
+  // A new node, for the places that it is nearest to.
+  void Note(int node) {
+    const Vec3d& place_mm = growth_.nodes()[node].place_mm;
+    node_cubes_.Add(place_mm, node);
+    drawing_cubes_.ForEachNear(place_mm, [&](int i) {
+      Drawing& drawing = drawings_[i];
+      double squared;
+      if (drawing.patience == 0 || !Draws(drawing, node, &squared)) return;
+      drawing.squared_mm2 = squared;
+      drawing.nearest = node;
+      if (squared < reach_mm2_) drawing.patience = 0;
+    });
+  }
+
+  void FindNearest(Drawing* drawing) const {
+    drawing->nearest = -1;
+    drawing->squared_mm2 = influence_mm2_;
+    node_cubes_.ForEachNear(drawing->place_mm, [&](int node) {
+      double squared;
+      if (!Draws(*drawing, node, &squared) || !growth_.MayGrow(node, internode_mm_)) return;
+      drawing->squared_mm2 = squared;
+      drawing->nearest = node;
+    });
+  }
+
+  std::vector<Pull> CollectPulls() {
+    std::vector<Pull> pulls;
+    std::unordered_map<int, size_t> of_node;
+    for (size_t i = 0; i < drawings_.size(); ++i) {
+      Drawing& drawing = drawings_[i];
+      if (drawing.patience == 0 || drawing.nearest < 0) continue;
+      if (!growth_.MayGrow(drawing.nearest, internode_mm_)) FindNearest(&drawing);
+      if (drawing.nearest < 0) continue;
+      const auto [entry, is_new] = of_node.try_emplace(drawing.nearest, pulls.size());
+      if (is_new) pulls.push_back({drawing.nearest, Vec3d::Zero(), {}});
+      Pull& pull = pulls[entry->second];
+      const VesselNode& node = growth_.nodes()[drawing.nearest];
+      pull.direction += Along(node.normal, drawing.place_mm - node.place_mm).normalized();
+      pull.drawings.push_back(static_cast<int>(i));
+    }
+    return pulls;
+  }
+
+  // A step of every node that is drawn at; false if none is. Nodes keep apart and patience goes, so there is
+  // an end.
+  bool GrowOnce() {
+    const std::vector<Pull> pulls = CollectPulls();
+    for (const Pull& pull : pulls) {
+      const int grown = growth_.Step(pull.node, pull.direction.normalized());
+      if (grown >= 0) Note(grown);
+      for (const int i : pull.drawings) {
+        Drawing& drawing = drawings_[i];
+        if (drawing.nearest == pull.node && drawing.patience > 0) --drawing.patience;
+      }
+    }
+    return !pulls.empty();
+  }
+
+  const double influence_mm2_, reach_mm2_, internode_mm_;
+  Growth& growth_;
+  std::vector<Drawing> drawings_;
+  CubeMap drawing_cubes_, node_cubes_;
+};
+
+std::vector<int> CountChildren(const std::vector<VesselNode>& nodes) {
+  std::vector<int> children(nodes.size(), 0);
+  for (const VesselNode& node : nodes) {
+    if (node.parent >= 0) ++children[node.parent];
+  }
+  return children;
+}
+
+std::vector<VesselNode> WithoutStubs(const std::vector<VesselNode>& nodes) {
+  std::vector<int> steps_beyond(nodes.size(), 0), longest(nodes.size(), -1), now(nodes.size(), -1);
+  for (size_t i = nodes.size(); i-- > 0;) {
+    const int parent = nodes[i].parent;
+    if (parent < 0 || steps_beyond[i] < steps_beyond[parent]) continue;
+    steps_beyond[parent] = steps_beyond[i] + 1;
+    longest[parent] = static_cast<int>(i);
+  }
+  std::vector<VesselNode> kept;
+  for (size_t i = 0; i < nodes.size(); ++i) {
+    VesselNode node = nodes[i];
+    if (node.parent >= 0) {
+      const bool on_the_side = longest[node.parent] != static_cast<int>(i);
+      const bool stub = on_the_side && steps_beyond[i] + 1 < kShortestBranch;
+      if (stub || now[node.parent] < 0) continue;
+      node.parent = now[node.parent];
+    }
+    now[i] = static_cast<int>(kept.size());
+    kept.push_back(node);
+  }
+  return kept;
+}
+
+// Moves every node along the wall half the way to the mean of its parent and its children.
+void Smooth(const std::vector<int>& children, std::vector<VesselNode>* nodes) {
+  std::vector<Vec3d> middles(nodes->size(), Vec3d::Zero());
+  for (const VesselNode& node : *nodes) {
+    if (node.parent >= 0) middles[node.parent] += node.place_mm / children[node.parent];
+  }
+  for (size_t i = 0; i < nodes->size(); ++i) {
+    const VesselNode& node = (*nodes)[i];
+    if (node.parent >= 0 && children[i] > 0) middles[i] = (middles[i] + (*nodes)[node.parent].place_mm) / 2;
+  }
+  for (size_t i = 0; i < nodes->size(); ++i) {
+    VesselNode& node = (*nodes)[i];
+    if (node.parent >= 0 && children[i] > 0)
+      node.place_mm += 0.5 * Along(node.normal, middles[i] - node.place_mm);
+  }
+}
+
+// Before so many places are looked at that memory or time ends.
+void CheckBearable(const Mesh& wall, double step_mm) {
+  double area_mm2 = 0, longest_mm = 0;
+  for (size_t f = 0; f < wall.faces.size(); ++f) {
+    area_mm2 += FaceArea(wall, static_cast<int>(f));
+    for (int c = 0; c < 3; ++c) {
+      const Vec3i& face = wall.faces[f];
+      longest_mm = std::max(longest_mm, (wall.vertices[face[c]] - wall.vertices[face[(c + 1) % 3]]).norm());
+    }
+  }
+  const double least_mm = std::max(std::sqrt(area_mm2 / kMostPlaces), longest_mm / kMostParts);
+  if (step_mm >= least_mm) return;
+  throw InputError("there would be too many vessels on this wall; choose " +
+                   std::to_string(std::ceil(100 * least_mm / kStep) / 100) + " or more");
+}
+
+}  // namespace
+
+double VesselStep(double spacing_mm) { return std::min(kStep * spacing_mm, kLongestStep_mm); }
+
+std::vector<VesselNode> GrowVessels(const Mesh& wall, double spacing_mm, uint64_t seed) {
+  const double step_mm = VesselStep(spacing_mm);
+  CheckBearable(wall, step_mm);
+  Growth growth(wall, step_mm, seed);
+  for (const WallPlace& root : Scatter(growth.wall(), kRootDistance * spacing_mm))
+    growth.AddTrunk(root, kTrunk * spacing_mm);
+  for (const double distance : kDrawingDistances) Colonisation(distance * spacing_mm, &growth).Run();
+  std::vector<VesselNode> nodes = WithoutStubs(growth.TakeNodes());
+  const std::vector<int> children = CountChildren(nodes);
+  for (int i = 0; i < kSmoothings; ++i) Smooth(children, &nodes);
+  for (size_t i = nodes.size(); i-- > 0;) {
+    if (children[i] == 0) nodes[i].twigs = 1;
+    if (nodes[i].parent >= 0) nodes[nodes[i].parent].twigs += nodes[i].twigs;
+  }
+  return nodes;
+}
+
+}  // namespace lumen
