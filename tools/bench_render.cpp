@@ -2,12 +2,11 @@
 // time grows with pixels, samples and triangles; first, what finding triangles alone costs. Prints one table.
 // CPU seconds are the process's, medians of runs.
 #include <fmt/core.h>
-#include <sys/resource.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cmath>
-#include <fstream>
+#include <optional>
 
 #include "common/parallel.h"
 #include "common/progress.h"
@@ -15,6 +14,7 @@
 #include "sim/cost/frame_setup.h"
 #include "sim/cost/reference.h"
 #include "sim/cost/timing.h"
+#include "tools/bench_memory.h"
 #include "tools/bench_rays.h"
 
 namespace lumen {
@@ -29,6 +29,8 @@ const Settings kCoat = {"surface.coat.ior=1.37", "surface.coat.roughness=0.2"};
 const Settings kManyDirect = {"path.direct_oversampling=8"};
 const Settings kEightVertices = {"path.bounces=7"};
 
+constexpr int kMostFrames = 8;  // that the memory of is measured
+
 // Guides of one CF-H190L, mm.
 constexpr double kGuides[3][2] = {{3.24, 0.55}, {-2.77, 2.66}, {-1.27, -3.14}};
 
@@ -37,6 +39,8 @@ struct Arguments {
   double seconds = 60;  // CPU seconds that one render may take
   int runs = 3;
   bool large = false;
+  std::string only;                              // a section; empty = all
+  std::optional<std::pair<int, int>> memory_of;  // samples, frames: prints the MB of tracing them instead
 };
 
 Settings operator+(Settings a, const Settings& b) {
@@ -79,7 +83,7 @@ double CpuSecondsOfFrame(const Subject& subject, const PathOptions& options, int
   return MedianOf(seconds);
 }
 
-RayRates RaysAlone(const Arguments& arguments) {
+RayRates EmbreeAlone(const Arguments& arguments) {
   const Subject subject(SceneWith(arguments, {}, 0));
   const RayRates rates = MeasureRays(subject.scene, subject.wall->rays, arguments.runs);
   fmt::print("\nEmbree alone, one core, {} triangles\n", subject.scene.geometry.mesh.faces.size());
@@ -108,6 +112,8 @@ void DirectLight(const Arguments& arguments, double primary_rate) {
                name, rate, 100 * rate / primary_rate, 1e-6 * static_cast<double>(count.rays) / seconds);
   }
 }
+
+void Rays(const Arguments& arguments) { DirectLight(arguments, EmbreeAlone(arguments).primary); }
 
 // CPU seconds and noise of a render with so many samples; the noise from two with different random numbers.
 struct Trial {
@@ -212,27 +218,35 @@ void WholeFrame(const Arguments& arguments) {
   }
 }
 
-// Most memory that the process has held since ResetPeak, MB.
-double PeakMegabytes() {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);) {
-    if (line.starts_with("VmHWM:")) return std::stod(line.substr(6)) / 1024;
-  }
-  return 0;
+// Runs in a process of its own (MegabytesOfOtherProcess).
+double MegabytesOfTracing(const Arguments& arguments) {
+  const auto& [samples, frames] = *arguments.memory_of;
+  const Subject subject(SceneWith(
+      arguments,
+      kEightVertices + kTexture + kCoat + Settings{fmt::format("trajectory.frames={}", kMostFrames)}, 3));
+  const Image8& valid = subject.setup.valid();
+  const double film = 3.0 * sizeof(float) * valid.width * valid.height / kBytesPerMegabyte;
+  PathOptions options = subject.scene.path;
+  options.samples = samples;
+  return MegabytesBeyondBefore([&] {
+           for (int frame = 0; frame < frames; ++frame) {
+             FrameSetup(subject.scene, *subject.wall, frame, 0).Trace(options, 1);
+           }
+         }) -
+         film;
 }
-void ResetPeak() { std::ofstream("/proc/self/clear_refs") << "5"; }
 
 void Memory(const Arguments& arguments) {
   fmt::print("\nmemory beyond scene, its tree of boxes and film, three guides, texture, coat, 8 vertices\n");
-  const Subject subject(SceneWith(arguments, kEightVertices + kTexture + kCoat, 3));
-  const double film = 3 * 4.0 * subject.setup.valid().width * subject.setup.valid().height / 1048576;
-  for (int samples : {1, 4, 16}) {
-    PathOptions options = subject.scene.path;
-    options.samples = samples;
-    ResetPeak();
-    const double before = PeakMegabytes();
-    subject.setup.Trace(options, 1);
-    fmt::print("  {:>4} samples {:>34.1f} MB\n", samples, PeakMegabytes() - before - film);
+  const auto line = [](const std::string& name, double megabytes) {
+    fmt::print("  {:<40}{:>8.1f} MB\n", name, megabytes);
+  };
+  line("(what the measure says of 64 MB)",
+       MegabytesBeyondBefore([] { std::vector<char> held(64 * size_t{kBytesPerMegabyte}, 1); }));
+  for (const auto& [samples, frames] : {std::pair(1, 1), {8, 1}, {1, kMostFrames}}) {
+    line(fmt::format("samples: {}, frames: {}", samples, frames),
+         MegabytesOfOtherProcess(
+             {arguments.scene.string(), "--memory-of", std::to_string(samples), std::to_string(frames)}));
   }
 }
 
@@ -294,17 +308,19 @@ void Growth(const Arguments& arguments) {
   }
 }
 
+// By the names that --only takes.
+const std::pair<const char*, void (*)(const Arguments&)> kSections[] = {
+    {"rays", Rays},     {"noise", Noise},     {"frame", WholeFrame},
+    {"memory", Memory}, {"threads", Threads}, {"growth", Growth}};
+
 void Run(const Arguments& arguments) {
   SetQuiet(true);
   std::setvbuf(stdout, nullptr, _IOLBF, 0);
+  if (arguments.memory_of) return fmt::print("{}\n", MegabytesOfTracing(arguments));
   fmt::print("{} threads\n", ThreadCount());
-  const RayRates rays = RaysAlone(arguments);
-  DirectLight(arguments, rays.primary);
-  Noise(arguments);
-  WholeFrame(arguments);
-  Memory(arguments);
-  Threads(arguments);
-  Growth(arguments);
+  for (const auto& [name, section] : kSections) {
+    if (arguments.only.empty() || arguments.only == name) section(arguments);
+  }
 }
 
 }  // namespace
@@ -317,6 +333,11 @@ int main(int argc, char** argv) {
   app.add_option("--seconds", arguments.seconds, "CPU seconds that one render may take (default: 60)");
   app.add_option("--runs", arguments.runs, "of which the median counts (default: 3)");
   app.add_flag("--large", arguments.large, "up to five million triangles");
+  std::vector<std::string> sections;
+  for (const auto& section : lumen::kSections) sections.push_back(section.first);
+  app.add_option("--only", arguments.only, "measures one thing (default: all)")
+      ->check(CLI::IsMember(sections));
+  app.add_option("--memory-of", arguments.memory_of)->group("");  // what the benchmark calls itself with
   CLI11_PARSE(app, argc, argv);
   try {
     lumen::Run(arguments);
