@@ -214,33 +214,42 @@ class Growth {
     const double turn = kWander * (2 * UniformDouble(RandomBits(seed_, nodes_.size(), kWanderNumber)) - 1);
     direction = Along(node.normal, direction + turn * node.normal.cross(direction));
     if (direction.squaredNorm() == 0) return -1;
-    Vec3d place_mm = node.place_mm + step_mm_ * direction.normalized();
-    const WallPlace* const wall = NearestWall(place_mm, node.normal);
-    if (!wall) return -1;
-    place_mm = wall->place_mm + Along(wall->normal, place_mm - wall->place_mm);
-    return Free(place_mm, wall->normal, from) ? Add(place_mm, wall->normal, from) : -1;
+    WallPlace place = {node.place_mm + step_mm_ * direction.normalized(), node.normal};
+    if (!PutOnWall(&place) || !Free(place, from)) return -1;
+    return Add(place.place_mm, place.normal, from);
   }
 
  private:
-  const WallPlace* NearestWall(const Vec3d& place_mm, const Vec3d& normal) const {
+  // Moves a place that is near the wall onto it, and gives it the normal there. The plane through the wall's
+  // nearest sample that is across the mean of both normals meets the wall to second order: that of a circle's
+  // two radii is across the chord between them.
+  bool PutOnWall(WallPlace* place) const {
     const WallPlace* nearest = nullptr;
     double least = std::numeric_limits<double>::infinity();
-    wall_cubes_.ForEachNear(place_mm, [&](int i) {
-      const double squared = (wall_[i].place_mm - place_mm).squaredNorm();
-      if (squared >= least || !FacesAlike(wall_[i].normal, normal)) return;
+    Vec3d normals = Vec3d::Zero();
+    wall_cubes_.ForEachNear(place->place_mm, [&](int i) {
+      const double squared = (wall_[i].place_mm - place->place_mm).squaredNorm();
+      const double weight = 1 - squared / (4 * step_mm_ * step_mm_);
+      if (weight <= 0 || !FacesAlike(wall_[i].normal, place->normal)) return;
+      normals += weight * weight * wall_[i].normal;
+      if (squared >= least) return;
       least = squared;
       nearest = &wall_[i];
     });
-    return nearest;
+    if (!nearest) return false;
+    place->normal = normals.normalized();
+    const Vec3d across = (place->normal + nearest->normal).normalized();
+    place->place_mm = nearest->place_mm + Along(across, place->place_mm - nearest->place_mm);
+    return true;
   }
 
   // Whether a child of `from` keeps almost a step away from every vessel that it doesn't come from.
-  bool Free(const Vec3d& place_mm, const Vec3d& normal, int from) const {
+  bool Free(const WallPlace& place, int from) const {
     bool free = true;
-    node_cubes_.ForEachNear(place_mm, [&](int i) {
+    node_cubes_.ForEachNear(place.place_mm, [&](int i) {
       if (i == from || i == nodes_[from].parent || nodes_[i].parent == from) return;
-      free &= (nodes_[i].place_mm - place_mm).squaredNorm() >= 0.9 * step_mm_ * step_mm_ ||
-              !FacesAlike(nodes_[i].normal, normal);
+      free &= (nodes_[i].place_mm - place.place_mm).squaredNorm() >= 0.9 * step_mm_ * step_mm_ ||
+              !FacesAlike(nodes_[i].normal, place.normal);
     });
     return free;
   }

@@ -13,7 +13,8 @@
 // The trees live on the wall: they are straight segments from place to place on the resting mesh. Each is
 // drawn by projection onto the wall along the normal that the wall has there, so that neither the mesh's
 // facets nor its curvature between the segment's ends make a vessel sink: ρ is measured across that normal,
-// and places up to a step of the growth (at most 0.75 mm) in front of the segment or behind it see it.
+// and places up to a third of the growth's step (at most 0.25 mm) in front of the segment or behind it see
+// it.
 //
 // They are grown once, when a scene names them, and kept by cubes of space: a cube's list has every segment
 // whose box (length and width, rounded ends included, by twice the depth) meets the cube. So the list of a
