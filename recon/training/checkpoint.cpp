@@ -1,5 +1,6 @@
 #include "recon/training/checkpoint.h"
 
+#include <algorithm>
 #include <cstring>
 
 #include "common/files.h"
@@ -60,7 +61,7 @@ class Reader {
   [[noreturn]] void FailShort() const { throw DamagedCheckpoint(name_ + ": the checkpoint is cut short"); }
   void Copy(void* to, size_t size) {
     if (size > bytes_.size()) FailShort();
-    std::memcpy(to, bytes_.data(), size);
+    std::copy_n(bytes_.data(), size, static_cast<char*>(to));  // which may be an empty array's: nowhere
     bytes_.remove_prefix(size);
   }
   std::string_view bytes_;

@@ -13,8 +13,9 @@ inline Lanes3 OffsetOrigin(const Lanes3& points, const Lanes3& normals) {
   // transform; below 1/32 of a mm, where such steps vanish, a fixed length takes over.
   constexpr float kScale = 256, kNearZero = 1.0f / 32, kFixed = 1.0f / 65536;
   const auto moved = [](const Lanes& point, const Lanes& normal) {
-    const LanesI steps = Truncate(kScale * normal);
-    const Lanes far = (Lanes)((LanesI)point + (point < 0.0f ? -steps : steps));
+    // Without a sign: lanes that met nothing hold any normal, whose steps may be too many for one.
+    const LanesU steps = (LanesU)Truncate(kScale * normal);
+    const Lanes far = (Lanes)((LanesU)point + (point < 0.0f ? -steps : steps));
     return Abs(point) < kNearZero ? point + kFixed * normal : far;
   };
   return {moved(points.x, normals.x), moved(points.y, normals.y), moved(points.z, normals.z)};
