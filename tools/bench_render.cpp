@@ -198,13 +198,18 @@ double NoiseOfChannels(const ImageF& a, const ImageF& b, const Image8& valid) {
   return std::sqrt(sum / (3 * double(count)));
 }
 
+// A large frame's neighbouring pixels see nearly the same: one sample of light between walls a pixel is
+// enough, by as many shared paths as it takes.
 void WholeFrame(const Arguments& arguments) {
   const Subject subject(SceneWith(
       arguments, kTexture + Settings{"camera.width=1350", "camera.height=1080", "path.bounces=3"}, 0));
   const SensorNoise sensor;
   PathOptions options = subject.scene.path;
+  options.samples = 1;
+  options.direct_oversampling = 4;
   fmt::print("\n1350x1080, 3 bounces, textured, at the noise of the sensor (10000 e, read 5 e, gain 1)\n");
-  for (options.samples = 1;; options.samples *= 2) {
+  double seconds_before = 0, excess_before = 0;  // noise over the sensor's
+  for (options.shared_paths = 16;; options.shared_paths *= 2) {
     ImageF pictures[2];
     double seconds = 0;
     for (int k = 0; k < 2; ++k) {
@@ -212,9 +217,17 @@ void WholeFrame(const Arguments& arguments) {
     }
     const double noise = NoiseOfChannels(pictures[0], pictures[1], subject.setup.valid());
     const double limit = SensorNoiseOf(sensor, pictures[0], subject.setup.valid());
-    fmt::print("  {:>4} samples: noise {:.5f}, sensor's {:.5f} {:>20.2f} CPU-s\n", options.samples, noise,
-               limit, seconds);
-    if (noise <= limit || 2 * seconds > arguments.seconds) break;
+    fmt::print("  {:>4} shared paths: noise {:.5f}, sensor's {:.5f} {:>15.2f} CPU-s\n", options.shared_paths,
+               noise, limit, seconds);
+    const double excess = noise / limit;
+    if (excess <= 1 && excess_before > 1) {
+      const double t = std::log(excess_before) / std::log(excess_before / excess);
+      fmt::print("  interpolated (logarithms){:>39.2f} CPU-s\n",
+                 seconds_before * std::pow(seconds / seconds_before, t));
+    }
+    if (excess <= 1 || 2 * seconds > arguments.seconds) break;
+    seconds_before = seconds;
+    excess_before = excess;
   }
 }
 
