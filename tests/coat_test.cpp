@@ -357,7 +357,7 @@ TEST(Coat, MirrorStaysFinite) {
 TEST(Coat, ReadsItsTable) {
   const auto read = [](const std::string& text) {
     const Config config = Config::Parse(text, "scene.toml");
-    const Surface surface = ReadSurface(config.root());
+    const Surface surface = ReadSurface(config.root(), {}, 0);
     config.RejectUnknown();
     return surface;
   };

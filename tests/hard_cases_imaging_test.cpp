@@ -28,7 +28,7 @@ TEST(HardCases, BlackWallSendsNothing) {
   for (const bool vessels : {false, true}) {
     Stage stage(test::Globe(20, 30), CentredPinhole(24, 18, 12), kIntensity);
     stage.surface.albedo.setZero();
-    if (vessels) stage.surface.vessels.emplace();
+    if (vessels) stage.surface.vessels.emplace(VesselOptions{}, stage.mesh, 1);
     stage.options = {4, 6, 0};
     for (const float value : stage.Render().radiance.data) EXPECT_EQ(value, 0);
   }

@@ -197,7 +197,7 @@ TEST(HardCases, FarFromTheOrigin) {
   Stage near(mesh, camera, kIntensity);
   near.world_from_camera.translation() = Vec3d(3, -2, 1);
   near.light.sources[0].position = Vec3d(2, 1, 0);
-  near.surface.vessels.emplace();  // a texture too
+  near.surface.vessels.emplace(VesselOptions{}, mesh, 1);  // a texture too
   const Vec3d offset(1e5, -1e5, 1e5);
   Mesh moved = mesh;
   for (Vec3d& vertex : moved.vertices) vertex += offset;

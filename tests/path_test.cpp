@@ -368,7 +368,7 @@ TEST(Path, PartsAddUp) {
 
 TEST(Path, SameForAnyNumberOfThreads) {
   Stage stage(Sphere(20, 30), Pinhole(61, 47, 30), OneGuide({3, 1, 0}));
-  stage.surface.vessels.emplace();
+  stage.surface.vessels.emplace(VesselOptions{}, stage.mesh, 1);
   stage.options = {4, 3, 1};
   SetThreadCount(1);
   const Film one = stage.Render(5, true);

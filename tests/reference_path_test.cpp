@@ -143,7 +143,7 @@ int BlocksOff(const BlockMeans& a, const BlockMeans& b) {
 TEST(ReferencePath, LightBetweenWallsByBlocks) {
   Stage stage = StageIn(Tube(18, 40, 20, 30));
   stage.surface.mottling = Mottling{};
-  stage.surface.vessels = Vessels{};
+  stage.surface.vessels.emplace(VesselOptions{}, stage.mesh, 1);
   stage.options = {16, 4, 1};
   const BlockMeans plain = MeansOf([&](uint64_t seed) { return Plain<double>(stage, 1000 + seed); });
   const BlockMeans single = MeansOf([&](uint64_t seed) { return Plain<float>(stage, 2000 + seed); });

@@ -31,7 +31,7 @@ TEST(Scene, ReadsEveryTable) {
   EXPECT_EQ(scene.calibration.light.sources[1].intensity, Vec3d(600, 600, 600));
   EXPECT_EQ(scene.calibration.response.vignetting, 1.5);
   EXPECT_EQ(scene.surface.albedo, Vec3d(0.7, 0.4, 0.3));
-  EXPECT_EQ(scene.surface.vessels->width_mm, 0.4);
+  EXPECT_EQ(scene.surface.vessels->options().width_mm, 0.4);
   EXPECT_TRUE(scene.surface.mottling);
   EXPECT_EQ(scene.path.samples, 3);
   EXPECT_EQ(scene.path.bounces, 2);

@@ -186,7 +186,7 @@ Stage Coated() {
   stage.light.sources = {{Vec3d(2, 1, 0), Vec3d::UnitZ(), 1, Vec3d::Constant(500)}};
   stage.surface.coat.emplace(CoatOptions{});
   stage.surface.mottling.emplace();
-  stage.surface.vessels.emplace();
+  stage.surface.vessels.emplace(VesselOptions{}, stage.mesh, 1);
   stage.options.samples = 4;
   stage.options.bounces = 2;
   return stage;
@@ -260,7 +260,9 @@ TEST(TissuePath, TextureDimsTheTissue) {
 }
 
 TEST(TissuePath, SceneNamesIt) {
-  const auto read = [](const char* text) { return ReadSurface(Config::Parse(text, "scene.toml").root()); };
+  const auto read = [](const char* text) {
+    return ReadSurface(Config::Parse(text, "scene.toml").root(), {}, 0);
+  };
   EXPECT_FALSE(read("").subsurface);
   const Surface defaults = read("[subsurface]"), other = read("[subsurface]\nabsorption_per_mm = [0, 0, 0]");
   EXPECT_LT(defaults.subsurface->EvenReflectance().maxCoeff(), 0.3);

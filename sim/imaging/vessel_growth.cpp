@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <sstream>
 #include <unordered_map>
 
 #include "common/error.h"
@@ -429,8 +430,10 @@ void CheckBearable(const Mesh& wall, double step_mm) {
   }
   const double least_mm = std::max(std::sqrt(area_mm2 / kMostPlaces), longest_mm / kMostParts);
   if (step_mm >= least_mm) return;
-  throw InputError("there would be too many vessels on this wall; choose " +
-                   std::to_string(std::ceil(100 * least_mm / kStep) / 100) + " or more");
+  std::ostringstream message;
+  message << "there would be too many vessels on this wall; choose "
+          << std::ceil(100 * least_mm / kStep) / 100 << " or more";
+  throw InputError(message.str());
 }
 
 }  // namespace
