@@ -238,6 +238,21 @@ TEST(Vessels, AreAFunctionOfSeedAndPlace) {
   EXPECT_LT(in_both, in_one / 5);
 }
 
+// Growth decides by comparing; what a mesh's rounding changes must not be among it.
+TEST(Vessels, GrowAlikeOnAWallThatIsRoundedOtherwise) {
+  const VesselOptions options{6, 0.5, Vec3d::Ones()};
+  Mesh rounded = Wall();
+  for (size_t i = 0; i < rounded.vertices.size(); ++i) {
+    for (int c = 0; c < 3; ++c) rounded.vertices[i][c] += 1e-9 * Uniform(i, 4 + c);
+  }
+  const Vessels there(options, Wall(), 1), here(options, rounded, 1);
+  ASSERT_EQ(there.segments().size(), here.segments().size());
+  for (size_t i = 0; i < here.segments().size(); ++i) {
+    EXPECT_LT((here.segments()[i].to_mm - there.segments()[i].to_mm).norm(), 1e-6);
+    EXPECT_EQ(here.segments()[i].width_mm, there.segments()[i].width_mm);
+  }
+}
+
 TEST(Vessels, RefuseWhatTheWallCannotBear) {
   const auto message = [](const std::string& text) -> std::string {
     try {

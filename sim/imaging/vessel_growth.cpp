@@ -8,6 +8,7 @@
 
 #include "common/error.h"
 #include "common/random.h"
+#include "sim/imaging/wall_places.h"
 
 namespace lumen {
 namespace {
@@ -25,138 +26,9 @@ constexpr double kInertia = 0.6, kWander = 0.5;
 constexpr int kPatience = 6;
 // In steps: side branches that are shorter than this are left out, and a vessel's path is smoothed so often.
 constexpr int kShortestBranch = 3, kSmoothings = 3;
-// Some 100 bytes each.
-constexpr double kMostPlaces = 2e6, kMostParts = 4096;
 
-// Which numbers are drawn.
-enum : uint64_t { kRankNumber = 3, kDirectionNumber, kWanderNumber };
-
-// A place of the wall with its smooth normal.
-struct WallPlace {
-  Vec3d place_mm, normal;
-  uint64_t rank = 0;  // random
-};
-
-// Through a fold the wall turns its back.
-bool FacesAlike(const Vec3d& a, const Vec3d& b) { return a.dot(b) > 0; }
-
-Vec3d Along(const Vec3d& normal, const Vec3d& direction) {
-  return direction - normal * normal.dot(direction);
-}
-
-// The cube of a lattice that a place lies in, as one number.
-Vec3i CubeOf(const Vec3d& place_mm, double side_mm) {
-  return (place_mm / side_mm).array().floor().cast<int>();
-}
-uint64_t KeyOf(const Vec3i& cube) {
-  constexpr uint64_t kMask = (1 << 21) - 1;
-  return (static_cast<uint64_t>(cube[0]) & kMask) << 42 | (static_cast<uint64_t>(cube[1]) & kMask) << 21 |
-         (static_cast<uint64_t>(cube[2]) & kMask);
-}
-
-// Items by the cubes that they lie in.
-class CubeMap {
- public:
-  explicit CubeMap(double reach_mm) : side_mm_(2 * reach_mm) {}
-
-  void Add(const Vec3d& place_mm, int item) { items_[KeyOf(CubeOf(place_mm, side_mm_))].push_back(item); }
-
-  // Calls body with every item within reach of a place, and with some others: those of the eight cubes around
-  // the lattice's corner that is nearest to it.
-  template <class Body>
-  void ForEachNear(const Vec3d& place_mm, const Body& body) const {
-    const Vec3i lowest = CubeOf(place_mm - Vec3d::Constant(side_mm_ / 2), side_mm_);
-    for (int i = 0; i < 8; ++i) {
-      const auto found = items_.find(KeyOf(lowest + Vec3i(i & 1, i >> 1 & 1, i >> 2)));
-      if (found == items_.end()) continue;
-      for (const int item : found->second) body(item);
-    }
-  }
-
- private:
-  double side_mm_;
-  std::unordered_map<uint64_t, std::vector<int>> items_;
-};
-
-// One place for each cube of the pitch's side that the wall goes through, by rank: of those looked at the
-// nearest to a random point of the cube, so that another mesh of the same wall gives nearly the same places.
-class WallSampler {
- public:
-  WallSampler(const Mesh& wall, double pitch_mm, uint64_t seed)
-      : wall_(wall), middle_(Bounds(wall).center()), pitch_mm_(pitch_mm), seed_(seed) {}
-
-  std::vector<WallPlace> Run() {
-    const std::vector<Vec3d> normals = VertexNormals(wall_);
-    for (const Vec3i& face : wall_.faces) {
-      Mat3<double> corners, corner_normals;
-      for (int c = 0; c < 3; ++c) {
-        corners.col(c) = wall_.vertices[face[c]] - middle_;
-        corner_normals.col(c) = normals[face[c]];
-      }
-      OfferFace(corners, corner_normals);
-    }
-    std::vector<WallPlace> places;
-    places.reserve(chosen_.size());
-    for (const auto& [key, chosen] : chosen_) places.push_back(chosen.place);
-    std::sort(places.begin(), places.end(), [](const auto& a, const auto& b) { return a.rank < b.rank; });
-    return places;
-  }
-
- private:
-  struct Chosen {
-    WallPlace place;
-    double squared_mm2;  // to the cube's random point
-  };
-
-  // The middles of equal triangles whose edges are no longer than the pitch.
-  void OfferFace(const Mat3<double>& corners, const Mat3<double>& normals) {
-    double longest_mm = 0;
-    for (int c = 0; c < 3; ++c)
-      longest_mm = std::max(longest_mm, (corners.col(c) - corners.col((c + 1) % 3)).norm());
-    const int parts = std::max(1, static_cast<int>(std::ceil(longest_mm / pitch_mm_)));
-    for (int i = 0; i < parts; ++i) {
-      for (int j = 0; i + j < parts; ++j) {
-        const double u = (i + 1.0 / 3) / parts, v = (j + 1.0 / 3) / parts;
-        const Vec3d weights(1 - u - v, u, v), normal = normals * weights;
-        if (normal.squaredNorm() > 0) Offer(corners * weights, normal.normalized());
-      }
-    }
-  }
-
-  void Offer(const Vec3d& place_mm, const Vec3d& normal) {
-    const Vec3i cube = CubeOf(place_mm, pitch_mm_);
-    const uint64_t key = KeyOf(cube);
-    Vec3d target;
-    for (int c = 0; c < 3; ++c) target[c] = pitch_mm_ * (cube[c] + UniformDouble(RandomBits(seed_, key, c)));
-    const double squared = (place_mm - target).squaredNorm();
-    const auto [entry, is_new] = chosen_.try_emplace(key);
-    if (is_new || squared < entry->second.squared_mm2)
-      entry->second = {{place_mm, normal, RandomBits(seed_, key, kRankNumber)}, squared};
-  }
-
-  const Mesh& wall_;
-  const Vec3d middle_;
-  const double pitch_mm_;
-  const uint64_t seed_;
-  std::unordered_map<uint64_t, Chosen> chosen_;
-};
-
-// The first of the places, and whichever of the later ones are no nearer than a distance to those before.
-std::vector<WallPlace> Scatter(const std::vector<WallPlace>& places, double distance_mm) {
-  std::vector<WallPlace> scattered;
-  CubeMap taken(distance_mm);
-  for (const WallPlace& place : places) {
-    bool free = true;
-    taken.ForEachNear(place.place_mm, [&](int i) {
-      free &= (scattered[i].place_mm - place.place_mm).squaredNorm() >= distance_mm * distance_mm ||
-              !FacesAlike(scattered[i].normal, place.normal);
-    });
-    if (!free) continue;
-    taken.Add(place.place_mm, static_cast<int>(scattered.size()));
-    scattered.push_back(place);
-  }
-  return scattered;
-}
+// The numbers that a node draws.
+enum : uint64_t { kDirectionNumber, kWanderNumber };
 
 // The trees' nodes while they grow.
 class Growth {
@@ -164,7 +36,7 @@ class Growth {
   Growth(const Mesh& wall, double step_mm, uint64_t seed)
       : seed_(seed),
         step_mm_(step_mm),
-        wall_(WallSampler(wall, step_mm, seed).Run()),
+        wall_(SampleWall(wall, step_mm, seed)),
         wall_cubes_(2 * step_mm),
         node_cubes_(step_mm) {
     for (size_t i = 0; i < wall_.size(); ++i) wall_cubes_.Add(wall_[i].place_mm, static_cast<int>(i));
@@ -420,15 +292,7 @@ void Smooth(const std::vector<int>& children, std::vector<VesselNode>* nodes) {
 
 // Before so many places are looked at that memory or time ends.
 void CheckBearable(const Mesh& wall, double step_mm) {
-  double area_mm2 = 0, longest_mm = 0;
-  for (size_t f = 0; f < wall.faces.size(); ++f) {
-    area_mm2 += FaceArea(wall, static_cast<int>(f));
-    for (int c = 0; c < 3; ++c) {
-      const Vec3i& face = wall.faces[f];
-      longest_mm = std::max(longest_mm, (wall.vertices[face[c]] - wall.vertices[face[(c + 1) % 3]]).norm());
-    }
-  }
-  const double least_mm = std::max(std::sqrt(area_mm2 / kMostPlaces), longest_mm / kMostParts);
+  const double least_mm = LeastPitch(wall);
   if (step_mm >= least_mm) return;
   std::ostringstream message;
   message << "there would be too many vessels on this wall; choose "
