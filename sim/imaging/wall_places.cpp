@@ -39,7 +39,7 @@ class WallSampler {
  private:
   struct Chosen {
     WallPlace place;
-    double squared_mm2;  // to the cube's random point
+    double squared;  // distance to the cube's random point, in pitches
   };
 
   // The middles of equal triangles whose edges are no longer than the pitch.
@@ -60,14 +60,21 @@ class WallSampler {
   }
 
   void Offer(const Vec3d& place_mm, const Vec3d& normal) {
-    const Vec3i cube = CubeOf(place_mm, pitch_mm_);
+    // A lattice in no special place: on its planes rounding would choose the cube, and walls may be
+    // symmetric.
+    const Vec3d in_lattice = place_mm / pitch_mm_ + PointOf(0);
+    const Vec3i cube = CubeOf(in_lattice, 1);
     const uint64_t key = KeyOf(cube);
-    Vec3d target;
-    for (int c = 0; c < 3; ++c) target[c] = pitch_mm_ * (cube[c] + UniformDouble(RandomBits(seed_, key, c)));
-    const double squared = (place_mm - target).squaredNorm();
+    const double squared = (in_lattice - cube.cast<double>() - PointOf(key)).squaredNorm();
     const auto [entry, is_new] = chosen_.try_emplace(key);
-    if (is_new || squared < entry->second.squared_mm2)
+    if (is_new || squared < entry->second.squared)
       entry->second = {{place_mm, normal, RandomBits(seed_, key, kRankNumber)}, squared};
+  }
+
+  // A random point of the unit cube.
+  Vec3d PointOf(uint64_t key) const {
+    return {UniformDouble(RandomBits(seed_, key, 0)), UniformDouble(RandomBits(seed_, key, 1)),
+            UniformDouble(RandomBits(seed_, key, 2))};
   }
 
   const Mesh& wall_;
