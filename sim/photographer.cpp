@@ -15,8 +15,9 @@ Image8 Photographer::Photograph(int frame, double gain, const ImageF& radiance) 
   if (scene_.chromatic_aberration) {
     dispersed = Disperse(*scene_.chromatic_aberration, scene_.calibration.camera, radiance, valid_);
   }
-  const Image8 developed = Expose(frame, gain, scene_.chromatic_aberration ? dispersed : radiance);
-  return scene_.sensor.jpeg ? ThroughJpeg(developed, scene_.sensor.jpeg->quality) : developed;
+  Image8 picture = Expose(frame, gain, scene_.chromatic_aberration ? dispersed : radiance);
+  if (scene_.sensor.jpeg) picture = ThroughJpeg(picture, scene_.sensor.jpeg->quality);
+  return picture;
 }
 
 Image8 Photographer::Expose(int frame, double gain, const ImageF& radiance) const {

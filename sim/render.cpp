@@ -309,8 +309,6 @@ class Renderer {
 
 }  // namespace
 
-uint64_t SurfaceSeed(uint64_t seed) { return RandomBits(seed, 0x77616c6cull); }
-
 RenderResult Render(const Scene& scene, const RenderOptions& options) {
   return Renderer(scene, options).Run();
 }

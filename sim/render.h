@@ -34,7 +34,4 @@ struct RenderResult {
 // calibration.toml included; a sequence that was not rendered is refused. Throws InputError.
 RenderResult Render(const Scene& scene, const RenderOptions& options);
 
-// The seed of the wall's texture in a render with this seed.
-uint64_t SurfaceSeed(uint64_t seed);
-
 }  // namespace lumen

@@ -3,12 +3,12 @@
 set -euo pipefail
 
 # openimageio-tools: Debian's CMake file of OpenImageIO refuses to load without its programs. python3: reads in
-# the tests what is exported for other programs.
+# the tests what is exported for other programs. valgrind: counts in a test what an effect that is off costs.
 packages=(
   g++ cmake ninja-build
   libembree-dev libopenimageio-dev openimageio-tools libeigen3-dev libcgal-dev libopenmesh-dev libtbb-dev
   libfmt-dev libtomlplusplus-dev libcli11-dev nlohmann-json3-dev libgtest-dev libbenchmark-dev fonts-dejavu-core
-  python3
+  python3 valgrind
 )
 
 missing=()

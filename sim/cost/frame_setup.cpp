@@ -1,7 +1,5 @@
 #include "sim/cost/frame_setup.h"
 
-#include "sim/render.h"
-
 namespace lumen {
 
 FrameSetup::FrameSetup(const Scene& scene, const WallMoment& wall, int frame, uint64_t seed)

@@ -35,6 +35,9 @@ struct Surface {
 // Reads the scene's [surface]; vessels grow on the resting wall, from a seed of their own.
 Surface ReadSurface(const ConfigTable& surface, const Mesh& wall, uint64_t vessel_seed);
 
+// The seed of the wall's texture in a render with this seed.
+inline uint64_t SurfaceSeed(uint64_t seed) { return RandomBits(seed, 0x77616c6cull); }
+
 // Smooth noise in ±1 at a point, period-free, a function of seed (Perlin 2002: gradients at the integer
 // lattice, quintic interpolation).
 float GradientNoise(uint64_t seed, const Vec3f& point);
