@@ -222,6 +222,28 @@ std::optional<Vec2<T>> Camera<T>::Project(const Vec3<T>& point) const {
   return centre_ + pixel_from_plane_ * Vec2<T>(point.template head<2>() * (radius / sideways));
 }
 
+// With the model's radius w(θ) in its image plane, whose area scales by the matrix's determinant, an annulus of
+// 2π sinθ dθ sr fills 2π w dw: w w′/sinθ.
+template <class T>
+T Camera<T>::AreaPerSteradian(const Vec2<T>& pixel, const Vec3<T>& point) const {
+  const T area = pixel_from_plane_.determinant();
+  if (intrinsics_.model == CameraModel::kPinhole) {  // tanθ
+    const T cosine = point.z() / point.norm();
+    return area / (cosine * cosine * cosine);
+  }
+  if (intrinsics_.model == CameraModel::kKannalaBrandt) {  // θ · p(θ²)
+    const T sideways = point.template head<2>().norm(), angle = std::atan2(sideways, point.z());
+    const ValueAndSlope<T> p = EvaluatePolynomial(polynomial_, angle * angle);
+    const T over_sine = angle > 0 ? angle * point.norm() / sideways : T(1);
+    return area * p.value * (p.value + 2 * angle * angle * p.slope) * over_sine;
+  }
+  // θ = atan2(w, p(w)), so that sinθ = w/|(w, p)| and dθ/dw = (p − w p′)/|(w, p)|².
+  const T radius = (plane_from_pixel_ * (pixel - centre_)).norm();
+  const ValueAndSlope<T> p = EvaluatePolynomial(polynomial_, radius);
+  const T length = std::hypot(radius, p.value);
+  return area * length * length * length / (p.value - radius * p.slope);
+}
+
 template class Camera<float>;
 template class Camera<double>;
 

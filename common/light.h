@@ -47,4 +47,14 @@ Irradiance<T> IrradianceAt(const Vec3<T>& position, const Vec3<T>& direction, T 
   return {toward, std::exp(-spread * (1 - cos_angle)) / squared};
 }
 
+// The same pattern as directions to send light in: the integral of exp(−spread·(1 − cos)) over the sphere, sr …
+inline double PatternSolidAngle(double spread) {
+  return 2 * kPi * (spread > 0 ? -std::expm1(-2 * spread) / spread : 2.0);
+}
+// 1 − cos of a direction with a density in proportion to it, from a number in [0, 1): the inverse of its
+// distribution function, within 0…2 to rounding.
+inline double SamplePattern(double spread, double random) {
+  return spread > 0 ? -std::log1p(random * std::expm1(-2 * spread)) / spread : 2 * random;
+}
+
 }  // namespace lumen

@@ -66,6 +66,7 @@ struct FarEnds<true> {
     Lanes3 light;   // irradiance of a facing patch
   };
   Arrival from_guide;
+  GuideLobes guide_lobes;  // that it goes through
   Arrival from_walls;  // along the path, whose direction was chosen with the coat's density (Coat::Pdf) for
                        // light that leaves for where the path came from: not over that density
 
@@ -79,6 +80,7 @@ struct FarEnds<true> {
       return Arrival{Broadcast(arrival.toward[i]), Broadcast(arrival.light[i])};
     };
     lane.from_guide = all(from_guide);
+    lane.guide_lobes = guide_lobes;
     lane.from_walls = all(from_walls);
     return lane;
   }
@@ -92,11 +94,10 @@ struct FarEnds<true> {
   Sent To(const Lanes3& direction) const {
     CoatedLanes seen{places.normal, places.albedo, direction, places.coat_normal, {}};
     seen.reflectance = places.coat->Reflectance(Dot(seen.coat_normal, direction));
-    const auto sent = [&](const Arrival& arrival) {
-      const CoatLobesLanes lobes = places.coat->Eval(seen, arrival.toward);
-      return arrival.light * (lobes.base + Lanes3{lobes.glint, lobes.glint, lobes.glint});
-    };
-    return {sent(from_guide), sent(from_walls), places.coat->Pdf(seen, from_walls.toward)};
+    const Coat& coat = *places.coat;
+    return {from_guide.light * (guide_lobes == GuideLobes::kBase ? coat.EvalBase(seen, from_guide.toward)
+                                                                 : coat.EvalBoth(seen, from_guide.toward)),
+            from_walls.light * coat.EvalBoth(seen, from_walls.toward), coat.Pdf(seen, from_walls.toward)};
   }
 
   // Towards where the paths came from.
@@ -109,8 +110,8 @@ struct FarEnds<true> {
 template <bool kCoat>
 class BouncePaths {
  public:
-  BouncePaths(const PathScene& scene, const PathOptions& options)
-      : wall_(*scene.wall), options_(options), finder_(scene) {
+  BouncePaths(const PathScene& scene, const PathOptions& options, GuideLobes guide_lobes)
+      : wall_(*scene.wall), options_(options), guide_lobes_(guide_lobes), finder_(scene) {
     if (scene.surface->subsurface) walks_.emplace(scene);
   }
 
@@ -118,14 +119,15 @@ class BouncePaths {
   FarEnds<kCoat> End(const Eye& eye, const BounceStart& start, BouncePairs pairs, int64_t* rays) const {
     FarEnds<kCoat> ends;
     HitPacket hits;
-    ends.places = Trace(start.on, start.origin, start.direction, &hits, rays);
+    ends.places = Meet(start.on, start.origin, start.direction, &hits, rays);
     if constexpr (!kCoat) {
       if (walks_) ends.entries = Entries(hits, ends.places, 1, start, rays);
     }
     const PlacesOf<kCoat>& lit = Lit(ends);
-    const ChosenLight light =
-        LightFromOneGuide<kCoat>(wall_, eye, lit, Numbers(start, lit.alive, pairs.Guide(1)), rays);
+    const ChosenLight light = LightFromOneGuide<kCoat>(wall_, eye, lit, guide_lobes_,
+                                                       Numbers(start, lit.alive, pairs.Guide(1)), rays);
     if constexpr (kCoat) {
+      ends.guide_lobes = guide_lobes_;
       ends.from_guide = {light.toward, light.irradiance};
       ends.from_walls = {light.toward, Lanes3{}};
     } else {
@@ -145,12 +147,12 @@ class BouncePaths {
         if (bounce == 2) ends->from_walls.toward = direction;
       }
       HitPacket hits;
-      places = Trace(places.alive, OffsetOrigin(places.point, places.normal), direction, &hits, rays);
+      places = Meet(places.alive, OffsetOrigin(places.point, places.normal), direction, &hits, rays);
       if constexpr (!kCoat) {
         if (walks_) places = Entries(hits, places, bounce, start, rays);
       }
       const ChosenLight light = LightFromOneGuide<kCoat>(
-          wall_, eye, places, Numbers(start, places.alive, pairs.Guide(bounce)), rays);
+          wall_, eye, places, guide_lobes_, Numbers(start, places.alive, pairs.Guide(bounce)), rays);
       incoming = incoming + Select(places.alive, throughput * light.sent, Lanes3{});
     }
     if constexpr (kCoat) {
@@ -158,6 +160,29 @@ class BouncePaths {
     } else {
       ends->radiance = ends->radiance + Lit(*ends).albedo * incoming;
     }
+  }
+
+  // The places that rays from the wall come to.
+  PlacesOf<kCoat> Meet(const LanesI& on, const Lanes3& origin, const Lanes3& direction, HitPacket* hits,
+                       int64_t* rays) const {
+    constexpr float kFar = 1e30f;
+    RayPacket packet;
+    Store3(origin, packet.origin);
+    Store3(direction, packet.direction);
+    for (int i = 0; i < kLanes; ++i) {
+      RayHit hit;
+      if (on[i]) {
+        hit = wall_.Intersect(origin[i], direction[i], 0, kFar);
+        ++*rays;
+      }
+      hits->face[i] = hit.face;
+      hits->t[i] = hit.t;
+      hits->u[i] = hit.u;
+      hits->v[i] = hit.v;
+    }
+    PlacesOf<kCoat> places = finder_.Find(packet, *hits, true);
+    if (kCoat && walks_) places.albedo = walks_->EvenAlbedo(places.albedo);
+    return places;
   }
 
  private:
@@ -212,28 +237,6 @@ class BouncePaths {
         hits, places, bounce, [&](int i) { return *start.samplers[i]; }, rays);
   }
 
-  PlacesOf<kCoat> Trace(const LanesI& on, const Lanes3& origin, const Lanes3& direction, HitPacket* hits,
-                        int64_t* rays) const {
-    constexpr float kFar = 1e30f;
-    RayPacket packet;
-    Store3(origin, packet.origin);
-    Store3(direction, packet.direction);
-    for (int i = 0; i < kLanes; ++i) {
-      RayHit hit;
-      if (on[i]) {
-        hit = wall_.Intersect(origin[i], direction[i], 0, kFar);
-        ++*rays;
-      }
-      hits->face[i] = hit.face;
-      hits->t[i] = hit.t;
-      hits->u[i] = hit.u;
-      hits->v[i] = hit.v;
-    }
-    PlacesOf<kCoat> places = finder_.Find(packet, *hits, true);
-    if (kCoat && walks_) places.albedo = walks_->EvenAlbedo(places.albedo);
-    return places;
-  }
-
   static Lanes Numbers(const BounceStart& start, const LanesI& alive, uint32_t pair) {
     Lanes numbers{};
     for (int i = 0; i < kLanes; ++i) {
@@ -244,6 +247,7 @@ class BouncePaths {
 
   const RayScene& wall_;
   const PathOptions options_;
+  const GuideLobes guide_lobes_;
   PlaceFinder<kCoat> finder_;
   std::optional<TissueWalks<kCoat>> walks_;
 };

@@ -170,13 +170,18 @@ Lanes Coat::Transmission(const CoatedLanes& places, const Lanes3& incoming) cons
          (1 / (1 - mean_reflectance_));
 }
 
+Lanes3 Coat::EvalBase(const CoatedLanes& places, const Lanes3& incoming) const {
+  const Lanes cosine = Dot(incoming, places.normal);
+  return places.albedo * (cosine > 0.0f ? Transmission(places, incoming) * cosine * kInversePi : Lanes{});
+}
+
 CoatLobesLanes Coat::Eval(const CoatedLanes& places, const Lanes3& incoming) const {
   const Lanes zero{};
   const Lanes cosine = Dot(incoming, places.normal), cos_in = Dot(incoming, places.coat_normal);
   const Lanes cos_out = Dot(places.outgoing, places.coat_normal);
   const LanesI lit = cosine > 0.0f;
   CoatLobesLanes lobes;
-  lobes.base = places.albedo * (lit ? Transmission(places, incoming) * cosine * kInversePi : zero);
+  lobes.base = EvalBase(places, incoming);
   lobes.glint = zero;
   const LanesI mirrors = lit & (cos_in > 0.0f) & (cos_out > 0.0f);
   if (!Any(mirrors)) return lobes;

@@ -121,6 +121,12 @@ class Coat {
   CoatLobes Eval(const CoatedPlace& place, const Vec3f& incoming) const;
   // The same in sixteen places at once, to rounding.
   CoatLobesLanes Eval(const CoatedLanes& places, const Lanes3& incoming) const;
+  // The second lobe alone, and the sum of both in each channel.
+  Lanes3 EvalBase(const CoatedLanes& places, const Lanes3& incoming) const;
+  Lanes3 EvalBoth(const CoatedLanes& places, const Lanes3& incoming) const {
+    const CoatLobesLanes lobes = Eval(places, incoming);
+    return lobes.base + Lanes3{lobes.glint, lobes.glint, lobes.glint};
+  }
   // What the coat lets by of light that the wall scatters, over that of a wall without one.
   Lanes Transmission(const CoatedLanes& places, const Lanes3& incoming) const;
   float Pdf(const CoatedPlace& place, const Vec3f& incoming) const;

@@ -53,6 +53,24 @@ LobesOf<kCoat> Reflected(const Guide& guide, const Incidence& incidence, const P
   }
 }
 
+// Which lobes of the wall the guides' light is followed through where paths from the camera meet it. Without a
+// coat there is one.
+enum class GuideLobes { kAll, kBase };
+
+// Both lobes' sum, or the base's alone.
+template <bool kCoat>
+Lanes3 Reflected(const Guide& guide, const Incidence& incidence, const PlacesOf<kCoat>& places,
+                 GuideLobes lobes) {
+  if constexpr (kCoat) {
+    if (lobes == GuideLobes::kBase) {
+      const LanesI lit = places.alive & (Dot(places.normal, incidence.toward) > 0.0f);
+      return places.coat->EvalBase(places.lanes(), incidence.toward) * Broadcast(guide.intensity) *
+             (lit ? incidence.per_intensity : Lanes{});
+    }
+  }
+  return Reflected<kCoat>(guide, incidence, places).Whole();
+}
+
 // −1 in those of the asked lanes from whose place a guide can't be seen. For places close together.
 inline LanesI Shadowed(const RayScene& wall, const Guide& guide, const Places& places, const LanesI& asked) {
   if (!Any(asked)) return LanesI{};
@@ -77,10 +95,10 @@ struct ChosenLight {
 // tells nearly as much as one to each. random: in [0, 1). A sum that isn't finite is passed on.
 template <bool kCoat>
 ChosenLight LightFromOneGuide(const RayScene& wall, const Eye& eye, const PlacesOf<kCoat>& places,
-                              const Lanes& random, int64_t* rays) {
+                              GuideLobes lobes, const Lanes& random, int64_t* rays) {
   Lanes sum{};
   for (const Guide& guide : eye.guides) {
-    sum += Sum(Reflected<kCoat>(guide, IncidenceFrom(guide, places.point), places).Whole());
+    sum += Sum(Reflected<kCoat>(guide, IncidenceFrom(guide, places.point), places, lobes));
   }
   // Adds up in the order of `sum`, so that random < 1 finds a guide; where random · sum rounds up to sum, the
   // last that shines.
@@ -90,7 +108,7 @@ ChosenLight LightFromOneGuide(const RayScene& wall, const Eye& eye, const Places
   ChosenLight light{};
   for (const Guide& guide : eye.guides) {
     const Incidence incidence = IncidenceFrom(guide, places.point);
-    const Lanes3 candidate = Reflected<kCoat>(guide, incidence, places).Whole();
+    const Lanes3 candidate = Reflected<kCoat>(guide, incidence, places, lobes);
     const Lanes part = Sum(candidate);
     const LanesI taken = ~found & (part > 0.0f);
     below += part;

@@ -11,6 +11,7 @@
 #include "sim/imaging/eye.h"
 #include "sim/imaging/glint_paths.h"
 #include "sim/imaging/guide_light.h"
+#include "sim/imaging/light_paths.h"
 #include "sim/imaging/pixel_samples.h"
 #include "sim/imaging/places.h"
 #include "sim/imaging/sampler.h"
@@ -52,9 +53,11 @@ class Tracer {
         direct_samples_(options.samples * options.direct_oversampling),
         seed_(seed),
         frame_(static_cast<uint64_t>(frame)),
+        from_guides_(kCoat && LightPaths::Serve(scene, view, options)),
         finder_(scene),
-        own_paths_(scene, options),
-        shared_paths_(scene, options),
+        own_paths_(scene, options, LobesOfBase()),
+        shared_paths_(scene, options, LobesOfBase()),
+        mirrored_paths_(scene, options, GuideLobes::kAll),
         pinhole_(!view.defocus || view.defocus->aperture_mm == 0),
         eye_(*scene.wall, *view.light, view.world_from_camera, pinhole_) {
     if (scene.surface->subsurface) walks_.emplace(scene);
@@ -82,6 +85,9 @@ class Tracer {
                   &total, [&](const TilePixels& pixels, uint64_t key, PathCount* count) {
                     TraceIndirect(pixels, key, sample, count);
                   });
+    }
+    if constexpr (kCoat) {
+      if (from_guides_) TraceFromGuides(&total);
     }
     AddIndirect(film);
     return total;
@@ -205,7 +211,7 @@ class Tracer {
   void TraceIndirect(const TilePixels& pixels, uint64_t key, int sample, PathCount* count) {
     TileSample<kCoat> tile;
     std::optional<GlintPaths> glints;
-    if constexpr (kCoat) glints.emplace(own_paths_, kGlintPairs, walks_ ? tile.mirrored : tile.indirect);
+    if constexpr (kCoat) glints.emplace(mirrored_paths_, kGlintPairs, walks_ ? tile.mirrored : tile.indirect);
     for (int block = 0; block < kBlocks; ++block) {
       tile.places[block].alive = LanesI{};
       tile.indirect[block] = Lanes3{};
@@ -269,6 +275,24 @@ class Tracer {
       ++lost_[pixel];
     }
   }
+
+  // Adds what paths from the guides bring to the frame's sums. The mean over samples that AddIndirect takes
+  // leaves out those that were not finite, all of which these paths have.
+  void TraceFromGuides(PathCount* total) {
+    LightPaths(scene_, view_, options_, eye_, seed_, frame_)
+        .Trace(&total->rays, [&](int sample, int x, int y, const Vec3f& light) {
+          if (!light.allFinite()) {
+            Note({1, x, y, sample}, &total->failure);
+            return;
+          }
+          const size_t pixel = static_cast<size_t>(y) * view_.valid->width + x;
+          const double kept = lost_.empty() ? 1 : 1 - double(lost_[pixel]) / options_.samples;
+          for (int c = 0; c < 3; ++c) indirect_[3 * pixel + c] += kept * light[c];
+        });
+  }
+
+  // Of guides' light that the base of what is seen sends on, by paths from the camera.
+  GuideLobes LobesOfBase() const { return from_guides_ ? GuideLobes::kBase : GuideLobes::kAll; }
 
   void AddIndirect(Film* film) const {
     ImageF& part = walks_ ? film->subsurface : film->indirect;
@@ -399,9 +423,11 @@ class Tracer {
   const PathOptions options_;
   const int direct_samples_;
   const uint64_t seed_, frame_;
+  const bool from_guides_;  // light that the coat mirrors onto other walls is traced from the guides
   const PlaceFinder<kCoat> finder_;
   const BouncePaths<kCoat> own_paths_;
   const SharedPaths<kCoat> shared_paths_;
+  const BouncePaths<kCoat> mirrored_paths_;  // that start at the coat of what is seen
   const bool pinhole_;
   const Eye eye_;  // at the frame's moment
   std::optional<TissueWalks<kCoat>> walks_;

@@ -25,11 +25,11 @@ namespace lumen {
 template <bool kCoat>
 class SharedPaths {
  public:
-  SharedPaths(const PathScene& scene, const PathOptions& options)
+  SharedPaths(const PathScene& scene, const PathOptions& options, GuideLobes guide_lobes)
       : wall_(*scene.wall),
         count_(options.shared_paths),
         sampling_(options.sampler),
-        paths_(scene, options) {}
+        paths_(scene, options, guide_lobes) {}
 
   // A path whose light is not finite is left out.
   struct Lost {
