@@ -222,8 +222,8 @@ std::optional<Vec2<T>> Camera<T>::Project(const Vec3<T>& point) const {
   return centre_ + pixel_from_plane_ * Vec2<T>(point.template head<2>() * (radius / sideways));
 }
 
-// With the model's radius w(θ) in its image plane, whose area scales by the matrix's determinant, an annulus of
-// 2π sinθ dθ sr fills 2π w dw: w w′/sinθ.
+// With the model's radius w(θ) in its image plane, whose area scales by the matrix's determinant, an annulus
+// of 2π sinθ dθ sr fills 2π w dw: w w′/sinθ.
 template <class T>
 T Camera<T>::AreaPerSteradian(const Vec2<T>& pixel, const Vec3<T>& point) const {
   const T area = pixel_from_plane_.determinant();

@@ -57,7 +57,8 @@ class Camera {
   std::optional<Vec2<T>> Project(const Vec3<T>& point) const;
 
   // How much of the image a small cone about a ray fills, px² per sr, where `point` (camera axes, any length)
-  // is on the ray of the pixel: the inverse of the determinant of Unproject's derivative. Infinite at the fold.
+  // is on the ray of the pixel: the inverse of the determinant of Unproject's derivative. Infinite at the
+  // fold.
   T AreaPerSteradian(const Vec2<T>& pixel, const Vec3<T>& point) const;
 
   // Largest angle to the axis, rad, at which the model is one-to-one.

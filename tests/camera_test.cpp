@@ -314,5 +314,41 @@ TEST(Camera, RefusesParametersThatDescribeNone) {
   EXPECT_THROW(Resized(CameraIntrinsics{}, 10, 10), InputError);
 }
 
+// Against central differences of Unproject: a pixel's square spans |∂r/∂x × ∂r/∂y| sr. Steps of h px leave
+// some h²/f² ≈ 1e-8 of it and roundings of ε/h ≈ 1e-13.
+TEST(Camera, AreaPerSteradianIsTheInverseOfThePixelsSolidAngle) {
+  CameraIntrinsics pinhole;
+  pinhole.width = 200;
+  pinhole.height = 160;
+  pinhole.cx = 90;
+  pinhole.cy = 85;
+  pinhole.fx = 150;
+  pinhole.fy = 170;
+  CameraIntrinsics stretched = C3vdIntrinsics();
+  stretched.stretch = {1.1, 0.2, -0.1};
+  for (const CameraIntrinsics& intrinsics : {pinhole, C3vdIntrinsics(), stretched, EndomapperIntrinsics()}) {
+    const Camera<double> camera(intrinsics);
+    constexpr double kStep_px = 1e-3;
+    for (int i = 0; i < 25; ++i) {
+      const Vec2d pixel(intrinsics.width * (0.15 + 0.17 * (i % 5)),
+                        intrinsics.height * (0.15 + 0.17 * (i / 5)));
+      const auto slope = [&](const Vec2d& step) {
+        return Vec3d((*camera.Unproject(pixel + step) - *camera.Unproject(pixel - step)) / (2 * kStep_px));
+      };
+      const double solid_angle = slope(Vec2d(kStep_px, 0)).cross(slope(Vec2d(0, kStep_px))).norm();
+      const Vec3d ray = *camera.Unproject(pixel);
+      EXPECT_NEAR(camera.AreaPerSteradian(pixel, 7 * ray) * solid_angle, 1, 1e-6) << i;
+      const auto in_float =
+          Camera<float>(intrinsics).AreaPerSteradian(pixel.cast<float>(), ray.cast<float>());
+      EXPECT_NEAR(in_float * solid_angle, 1, 1e-4) << i;
+    }
+    const Vec2d middle(intrinsics.cx, intrinsics.cy);
+    const Vec2d beside(intrinsics.cx + 0.01, intrinsics.cy);
+    EXPECT_NEAR(camera.AreaPerSteradian(middle, Vec3d::UnitZ()) /
+                    camera.AreaPerSteradian(beside, *camera.Unproject(beside)),
+                1, 1e-6);
+  }
+}
+
 }  // namespace
 }  // namespace lumen

@@ -3,7 +3,10 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+
+#include "common/random.h"
 
 namespace lumen {
 namespace {
@@ -92,6 +95,42 @@ TYPED_TEST(LightOf, PointOnTheSourceHasNoDirection) {
   const auto light = IrradianceAt<T>(Vec3<T>(1, 2, 3), Vec3<T>(0, 0, 1), T(2), Vec3<T>(1, 2, 3));
   EXPECT_EQ(light.toward, (Vec3<T>::Zero()));
   EXPECT_TRUE(std::isinf(light.per_intensity) && light.per_intensity > 0);
+}
+
+// The density of 1 − cos = t is spread · exp(−spread · t)/(1 − exp(−2 spread)), integrated by the midpoint
+// rule. χ² over cells alike in cosine, in standard deviations from its mean; another spread is noticed.
+TEST(Light, DirectionsHaveThePatternsDensity) {
+  constexpr int kCells = 40, kFine = 200, kCount = 40000;
+  const auto deviation = [&](double drawn, double tested) {
+    double found[kCells] = {}, expected[kCells] = {}, whole = 0;
+    for (int i = 0; i < kCount; ++i) {
+      const double below_axis = SamplePattern(drawn, UniformDouble(RandomBits(3, static_cast<uint64_t>(i))));
+      EXPECT_GE(below_axis, 0);
+      EXPECT_LE(below_axis, 2 + 1e-12);
+      ++found[std::min(kCells - 1, static_cast<int>(below_axis * (kCells / 2)))];
+    }
+    for (int i = 0; i < kCells * kFine; ++i) {
+      const double part = std::exp(-tested * 2 * (i + 0.5) / (kCells * kFine)) * 2 / (kCells * kFine);
+      expected[i / kFine] += part;
+      whole += part;
+    }
+    EXPECT_NEAR(PatternSolidAngle(tested), 2 * kPi * whole, 1e-4 * whole);
+    double sum = 0, rest_found = 0, rest_expected = 0;
+    int cells = -1;  // the total is given
+    for (int i = 0; i < kCells; ++i) {
+      rest_found += found[i];
+      rest_expected += kCount * expected[i] / whole;
+      if (rest_expected < 10 && i + 1 < kCells) continue;  // cells of few are taken together
+      if (rest_expected > 0) sum += std::pow(rest_found - rest_expected, 2) / std::max(1.0, rest_expected);
+      ++cells;
+      rest_found = rest_expected = 0;
+    }
+    return (sum - cells) / std::sqrt(2.0 * cells);
+  };
+  for (const double spread : {0.0, 1e-9, 0.3, 2.767302, 25.0}) {
+    EXPECT_LT(deviation(spread, spread), 5) << spread;
+    EXPECT_GT(deviation(spread, 1.1 * spread + 0.1), 10) << spread;
+  }
 }
 
 }  // namespace

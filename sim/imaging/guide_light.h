@@ -53,8 +53,8 @@ LobesOf<kCoat> Reflected(const Guide& guide, const Incidence& incidence, const P
   }
 }
 
-// Which lobes of the wall the guides' light is followed through where paths from the camera meet it. Without a
-// coat there is one.
+// Which lobes of the wall the guides' light is followed through where paths from the camera meet it. Without
+// a coat there is one.
 enum class GuideLobes { kAll, kBase };
 
 // Both lobes' sum, or the base's alone.

@@ -1,25 +1,26 @@
 // Light that a coat mirrors onto other walls, traced from the guides: light tracing (Dutré, Lafortune and
-// Willems 1993, "Monte Carlo light tracing with direct computation of pixel intensities"; the adjoint particles
-// of Veach 1997, "Robust Monte Carlo methods for light transport simulation", ch. 4). Paths from the camera
-// meet the place y that mirrors a guide rarely, and find it bright; a path from the guide meets it always.
+// Willems 1993, "Monte Carlo light tracing with direct computation of pixel intensities"; the adjoint
+// particles of Veach 1997, "Robust Monte Carlo methods for light transport simulation", ch. 4). Paths from
+// the camera meet the place y that mirrors a guide rarely, and find it bright; a path from the guide meets it
+// always.
 //
-// A guide sends a share of its power, intensity · exp(−spread · (1 − D·L)), along each of n directions that are
-// drawn with that density; at the wall, y, they go on by the coat's first lobe. Where such a path then meets the
-// wall, z, the camera sees what the base lobe sends of it: with the path's power Φ, mm² sr, a pixel's mean
-// radiance gains
+// A guide sends a share of its power, intensity · exp(−spread · (1 − D·L)), along each of n directions that
+// are drawn with that density; at the wall, y, they go on by the coat's first lobe. Where such a path then
+// meets the wall, z, the camera sees what the base lobe sends of it: with the path's power Φ, mm² sr, a
+// pixel's mean radiance gains
 //
 //   Φ · f_base(i, o) · V · (o·n)/d² · a
 //
-// with o the direction and d the distance to the camera, V whether it is seen and a the area of the image, px²,
-// that a steradian about o fills (Camera::AreaPerSteradian). From z paths go on by both lobes. The glints' lobe
-// is written for light that is followed from the viewer, as irradiance · f (i·s) with s the relief's normal and
-// not the wall's: along a path from the light it weighs (i·s)(o·n)/((i·n)(o·s)) times as much as towards it
-// (Veach, section 5.3, adjoint of shading normals).
+// with o the direction and d the distance to the camera, V whether it is seen and a the area of the image,
+// px², that a steradian about o fills (Camera::AreaPerSteradian). From z paths go on by both lobes. The
+// glints' lobe is written for light that is followed from the viewer, as irradiance · f (i·s) with s the
+// relief's normal and not the wall's: along a path from the light it weighs (i·s)(o·n)/((i·n)(o·s)) times as
+// much as towards it (Veach, section 5.3, adjoint of shading normals).
 //
 // The paths are those whose vertex next to a guide is a glint and whose vertex next to the camera is another
-// one and isn't; estimators that start at the camera leave just these out (GuideLobes::kBase). Bounces count as
-// theirs do: `bounces` is how often light goes from wall to wall, and between walls it meets `bounced_coat`.
-// Roulette keeps paths equally bright, from the first wall on.
+// one and isn't; estimators that start at the camera leave just these out (GuideLobes::kBase). Bounces count
+// as theirs do: `bounces` is how often light goes from wall to wall, and between walls it meets
+// `bounced_coat`. Roulette keeps paths equally bright, from the first wall on.
 #pragma once
 
 #include <algorithm>
@@ -66,7 +67,8 @@ class LightPaths {
       beam.rows = std::max(1, static_cast<int>(std::lround(std::sqrt(packets / kColumnsPerRow))));
       beam.columns = std::max(1, static_cast<int>(std::lround(packets / beam.rows)));
       const int64_t count = int64_t{beam.rows} * beam.columns;
-      beam.power = guide.intensity * static_cast<float>(PatternSolidAngle(guide.spread) / double(count * kLanes));
+      beam.power =
+          guide.intensity * static_cast<float>(PatternSolidAngle(guide.spread) / double(count * kLanes));
       beams_.push_back(beam);
       packets_ += count;
     }
@@ -95,10 +97,11 @@ class LightPaths {
   }
 
  private:
-  // Of a guide's paths for each sample and pixel that is rendered.
-  static constexpr double kPathsPerPixel = 1;
-  // The paths that go on from the first wall for each that the coat sends on all light of.
-  static constexpr float kPathsOfWeight = 4;
+  // The guides' paths for each sample and pixel that is rendered, and those that go on from the first wall
+  // for each that the coat sends on all light of; least time to a given noise, of 1 to 8 and of 1 to 8.
+  static constexpr double kPathsPerPixel = 4;
+  static constexpr float kPathsOfWeight = 2;
+  // A part of all directions that is worth while: a fiftieth.
   static constexpr double kLeastView_sr = 0.25;
   // Of a beam's cells, so that they are about as long as wide at the middle of its power.
   static constexpr int kColumnsPerRow = 4;
@@ -252,8 +255,8 @@ class LightPaths {
       const Vec3f toward = places.coat->Sample(place, sampler.Pair(kPairs.Direction(bounce)), chance[1]);
       const CoatLobes lobes = places.coat->Eval(place, toward);
       const float glint = lobes.glint > 0 ? lobes.glint * AdjointOfGlint(place, toward) : 0.0f;
-      const Vec3f power = start.weight[i].cwiseProduct(
-          (lobes.base + Vec3f::Constant(glint)) / places.coat->Pdf(place, toward));
+      const Vec3f power = start.weight[i].cwiseProduct((lobes.base + Vec3f::Constant(glint)) /
+                                                       places.coat->Pdf(place, toward));
       const float survival = std::min(1.0f, power.maxCoeff() / waiting->level[i]);
       if (chance[0] >= survival) {
         start.on[i] = 0;
@@ -275,10 +278,9 @@ class LightPaths {
     CoatedLanes seen = places.lanes();
     seen.outgoing = outgoing;
     seen.reflectance = coat.Reflectance(Dot(outgoing, seen.coat_normal));
-    const Lanes3 light =
-        start.weight * places.albedo *
-        (coat.Transmission(seen, places.outgoing) * Dot(outgoing, places.normal) / squared *
-         static_cast<float>(1 / kPi));
+    const Lanes3 light = start.weight * places.albedo *
+                         (coat.Transmission(seen, places.outgoing) * Dot(outgoing, places.normal) / squared *
+                          static_cast<float>(1 / kPi));
     const Lanes3 from = OffsetOrigin(places.point, places.normal);
     for (int i = 0; i < kLanes; ++i) {
       if (!turned[i]) continue;

@@ -211,7 +211,7 @@ class Tracer {
   void TraceIndirect(const TilePixels& pixels, uint64_t key, int sample, PathCount* count) {
     TileSample<kCoat> tile;
     std::optional<GlintPaths> glints;
-    if constexpr (kCoat) glints.emplace(mirrored_paths_, kGlintPairs, walks_ ? tile.mirrored : tile.indirect);
+    if constexpr (kCoat) glints.emplace(mirrored_paths_, kGlintPairs, tile.mirrored);
     for (int block = 0; block < kBlocks; ++block) {
       tile.places[block].alive = LanesI{};
       tile.indirect[block] = Lanes3{};
@@ -233,8 +233,27 @@ class Tracer {
       shared_paths_.Add(view_.motion ? EyeAt(pixels.y0 + kTileEdge / 2, key, sample) : eye_, seed_, key,
                         sample, &tile, &count->rays, lost);
     }
+    if (glints && options_.shared_paths > 0) AddAverage(pixels, tile, &*glints);
     for (int block = 0; block < kBlocks; ++block) {
       Deposit(pixels, block, sample, tile.indirect[block], tile.mirrored[block], count);
+    }
+  }
+
+  // The light that the tile's places receive on average is what they send by their albedo.
+  static void AddAverage(const TilePixels& pixels, const TileSample<kCoat>& tile, GlintPaths* glints) {
+    Lanes3 sent{}, albedo{};
+    for (int block = 0; block < kBlocks; ++block) {
+      const LanesI kept = tile.places[block].alive & IsFinite(Sum(tile.indirect[block]));
+      sent = sent + Select(kept, tile.indirect[block], Lanes3{});
+      albedo = albedo + Select(kept, tile.places[block].albedo, Lanes3{});
+    }
+    Vec3f average = Vec3f::Zero();
+    for (int i = 0; i < kLanes; ++i) average += sent[i];
+    Vec3f whole = Vec3f::Zero();
+    for (int i = 0; i < kLanes; ++i) whole += albedo[i];
+    for (int c = 0; c < 3; ++c) average[c] = whole[c] > 0 ? average[c] / whole[c] : 0.0f;
+    for (int block = 0; block < kBlocks; ++block) {
+      if (Any(pixels.on[block])) glints->AddAverage(block, average);
     }
   }
 
@@ -257,17 +276,18 @@ class Tracer {
   }
 
   // Adds a block's sample of indirect light to the frame's sums, but for pixels where it is not finite.
-  // mirrored: if it is kept apart.
+  // mirrored: what the coat of the pixels' places sends of it, where there is one.
   void Deposit(const TilePixels& pixels, int block, int sample, const Lanes3& light, const Lanes3& mirrored,
                PathCount* count) {
     for (int i = 0; i < kLanes; ++i) {
       if (!pixels.on[block][i]) continue;
       const int x = pixels.X(block, i), y = pixels.Y(block, i);
       const size_t pixel = static_cast<size_t>(y) * view_.valid->width + x;
-      const Vec3f value = light[i], apart = mirrored_.empty() ? Vec3f(0, 0, 0) : mirrored[i];
+      const Vec3f value = light[i], apart = kCoat ? mirrored[i] : Vec3f(0, 0, 0);
       if (value.allFinite() && apart.allFinite()) {
+        std::vector<double>& other = mirrored_.empty() ? indirect_ : mirrored_;
         for (int c = 0; c < 3; ++c) indirect_[3 * pixel + c] += value[c];
-        for (int c = 0; c < 3 && !mirrored_.empty(); ++c) mirrored_[3 * pixel + c] += apart[c];
+        for (int c = 0; c < 3 && kCoat; ++c) other[3 * pixel + c] += apart[c];
         continue;
       }
       Note({1, x, y, sample}, &count->failure);

@@ -81,8 +81,8 @@ class SharedPaths {
   }
 
  private:
-  // Least time to a given noise, of 1 to 8 without a coat, of 4 and 8 with one.
-  static constexpr int kPathsPerJoin = kCoat ? 8 : 4;
+  // Least time to a given noise, of 1 to 8 without a coat, of 2 to 16 with one.
+  static constexpr int kPathsPerJoin = 4;
   static constexpr uint64_t kTileNumbers = 1ull << 38;  // apart from its paths'
   static constexpr uint32_t kSourcePair = 0;
   static constexpr BouncePairs kPairs{1};

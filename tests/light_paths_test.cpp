@@ -1,0 +1,157 @@
+// Light that a coat mirrors onto other walls, traced from the guides, against the tracer's own paths from the
+// camera: an aperture a millionth of a mm wide is no pinhole to it, and all light is found from the camera.
+#include "sim/imaging/light_paths.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "tests/path_stage.h"
+#include "tests/welch.h"
+
+namespace lumen {
+namespace {
+
+constexpr int kSeeds = 16, kBlockEdge_px = 8, kAcross = 4, kDown = 3;
+
+// A camera and two guides off its axis in a globe whose coat is sharp, on a relief, and outshines the wall.
+test::Stage GlintingGlobe(double ior = 1.8) {
+  test::Stage stage(test::Globe(20, 40),
+                    test::CentredPinhole(kAcross * kBlockEdge_px, kDown * kBlockEdge_px, 16));
+  stage.surface.albedo = Vec3d(0.3, 0.15, 0.1);
+  stage.surface.coat.emplace(CoatOptions{ior, 0.3, 1, 0.06});
+  stage.light.sources.resize(2, stage.light.sources[0]);
+  stage.light.sources[0].position = Vec3d(3, 0.5, 0);
+  stage.light.sources[1].position = Vec3d(-2, -3, 0);
+  stage.light.sources[1].direction = Vec3d(0.3, 0.2, 1).normalized();
+  for (LightSource& source : stage.light.sources) source.spread = 2;
+  stage.light.sources[1].intensity = Vec3d(300, 200, 100);
+  stage.world_from_camera.translation() = Vec3d(3, -2, 4);
+  stage.options.samples = 16;
+  return stage;
+}
+
+// Blocks' means of green light between walls over seeds, and their variances.
+struct Blocks {
+  double mean[kAcross * kDown] = {}, variance[kAcross * kDown] = {};
+};
+
+Blocks Measure(const test::Stage& stage, uint64_t first_seed, const Defocus* defocus) {
+  Blocks blocks;
+  double squares[kAcross * kDown] = {};
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    Film film;
+    EXPECT_EQ(stage.Render(first_seed + seed, true, &film, defocus).failure.count, 0);
+    double sums[kAcross * kDown] = {};
+    for (int y = 0; y < film.indirect.height; ++y) {
+      for (int x = 0; x < film.indirect.width; ++x) {
+        sums[y / kBlockEdge_px * kAcross + x / kBlockEdge_px] +=
+            film.indirect.Pixel(x, y)[1] / double(kBlockEdge_px * kBlockEdge_px);
+      }
+    }
+    for (int i = 0; i < kAcross * kDown; ++i) {
+      blocks.mean[i] += sums[i] / kSeeds;
+      squares[i] += sums[i] * sums[i];
+    }
+  }
+  for (int i = 0; i < kAcross * kDown; ++i) {
+    blocks.variance[i] = (squares[i] - kSeeds * blocks.mean[i] * blocks.mean[i]) / (kSeeds * (kSeeds - 1.0));
+  }
+  return blocks;
+}
+
+double LeastChance(const Blocks& a, const Blocks& b) {
+  double least = 1;
+  for (int i = 0; i < kAcross * kDown; ++i) {
+    least = std::min(least, test::WelchChance(a.mean[i] - b.mean[i], a.variance[i], b.variance[i], kSeeds));
+  }
+  return least;
+}
+
+// Welch's test of blocks' means, one false alarm in 1,000; an index of refraction whose reflectance is 6% too
+// high is noticed. After one bounce and after three, the last between walls.
+TEST(LightPaths, AgreeWithPathsFromTheCamera) {
+  const Defocus point{1e-6, 10};
+  const double bound = test::SharedOut(1e-3, kAcross * kDown);
+  for (const int bounces : {1, 3}) {
+    test::Stage stage = GlintingGlobe();
+    stage.options.bounces = bounces;
+    const Blocks from_camera = Measure(stage, 100, &point), from_guides = Measure(stage, 200, nullptr);
+    EXPECT_GT(LeastChance(from_camera, from_guides), bound) << bounces;
+    stage.surface.coat.emplace(CoatOptions{1.834, 0.3, 1, 0.06});
+    const Blocks paler = Measure(stage, 200, nullptr);
+    EXPECT_LT(LeastChance(from_camera, paler), bound) << bounces;
+    // What the wider lobe after a bounce sends is the same from either side.
+    stage = GlintingGlobe();
+    stage.options.bounces = bounces;
+    stage.surface.bounced_coat.emplace(CoatOptions{1.8, 0.5, 1, 0.06});
+    EXPECT_GT(LeastChance(Measure(stage, 300, &point), Measure(stage, 400, nullptr)), bound) << bounces;
+  }
+}
+
+// Paths of the pixels' own leave out the same light.
+TEST(LightPaths, AgreeWithOwnPathsFromTheCamera) {
+  const Defocus point{1e-6, 10};
+  test::Stage stage = GlintingGlobe();
+  stage.options.bounces = 2;
+  stage.options.shared_paths = 0;
+  EXPECT_GT(LeastChance(Measure(stage, 100, &point), Measure(stage, 200, nullptr)),
+            test::SharedOut(1e-3, kAcross * kDown));
+}
+
+TEST(LightPaths, SameBytesForAnyNumberOfThreads) {
+  test::Stage stage = GlintingGlobe();
+  stage.options.bounces = 3;
+  SetThreadCount(1);
+  const Film one = stage.Render(5);
+  SetThreadCount(2);
+  const Film two = stage.Render(5);
+  SetThreadCount(0);
+  EXPECT_EQ(one.radiance.data, two.radiance.data);
+}
+
+// Light that pixels which aren't rendered would see goes nowhere.
+TEST(LightPaths, MaskedPixelsStayBlack) {
+  test::Stage stage = GlintingGlobe();
+  stage.options.bounces = 2;
+  for (int y = 0; y < stage.valid.height; ++y) {
+    for (int x = y % 3; x < stage.valid.width; x += 3) *stage.valid.Pixel(x, y) = 0;
+  }
+  const Film film = stage.Render(1);
+  for (int y = 0; y < stage.valid.height; ++y) {
+    for (int x = 0; x < stage.valid.width; ++x) {
+      EXPECT_EQ(test::PixelOf(film.radiance, x, y).isZero(0), *stage.valid.Pixel(x, y) == 0);
+    }
+  }
+}
+
+// What can't be told of a path before its pixel is known leaves a frame to the paths from the camera.
+TEST(LightPaths, ServeWidePinholesWithACoat) {
+  test::Stage stage = GlintingGlobe();
+  stage.options.bounces = 1;
+  const auto serve = [&](const Defocus* defocus = nullptr) {
+    const Camera<float> camera(stage.intrinsics);
+    return LightPaths::Serve({&stage.wall, &stage.surface, 0, &stage.vertex_normals},
+                             {&camera, &stage.valid, stage.world_from_camera, &stage.light, nullptr, defocus},
+                             stage.options);
+  };
+  const Defocus open{0.3, 10}, closed{0, 10};
+  EXPECT_TRUE(serve());
+  EXPECT_TRUE(serve(&closed));
+  EXPECT_FALSE(serve(&open));
+  stage.options.samples = 1;  // goes through the pixel's centre
+  EXPECT_FALSE(serve());
+  stage.options.direct_oversampling = 2;
+  EXPECT_TRUE(serve());
+  stage.options.bounces = 0;
+  EXPECT_FALSE(serve());
+  stage.options.bounces = 1;
+  stage.intrinsics.fx = stage.intrinsics.fy = 200;
+  EXPECT_FALSE(serve());
+  stage.intrinsics.fx = stage.intrinsics.fy = 16;
+  stage.surface.coat.reset();
+  EXPECT_FALSE(serve());
+}
+
+}  // namespace
+}  // namespace lumen
