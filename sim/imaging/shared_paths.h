@@ -29,6 +29,7 @@ class SharedPaths {
       : wall_(*scene.wall),
         count_(options.shared_paths),
         sampling_(options.sampler),
+        paths_per_join_(kCoat && guide_lobes == GuideLobes::kAll ? 8 : 4),
         paths_(scene, options, guide_lobes) {}
 
   // A path whose light is not finite is left out.
@@ -43,7 +44,7 @@ class SharedPaths {
            const OnLost& lost) const {
     const Places places(*tile);
     if (places.count == 0) return;
-    const int packets = (count_ * kPathsPerJoin + kLanes - 1) / kLanes;
+    const int packets = (count_ * paths_per_join_ + kLanes - 1) / kLanes;
     const Sampler tile_sampler(seed, key ^ kTileNumbers, static_cast<uint32_t>(sample), sampling_);
     std::vector<Packet> paths(static_cast<size_t>(packets));
     double whole = 0;
@@ -81,8 +82,6 @@ class SharedPaths {
   }
 
  private:
-  // Least time to a given noise, of 1 to 8 without a coat, of 2 to 16 with one.
-  static constexpr int kPathsPerJoin = 4;
   static constexpr uint64_t kTileNumbers = 1ull << 38;  // apart from its paths'
   static constexpr uint32_t kSourcePair = 0;
   static constexpr BouncePairs kPairs{1};
@@ -272,6 +271,9 @@ class SharedPaths {
   const RayScene& wall_;
   const int count_;
   const Sampling sampling_;
+  // Least time to a given noise, of 1 to 8 without a coat; with one, of 4 and 8 where ends mirror the guides'
+  // light, of 2 to 16 where they don't.
+  const int paths_per_join_;
   BouncePaths<kCoat> paths_;
 };
 
