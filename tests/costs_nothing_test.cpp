@@ -39,13 +39,14 @@ struct Effect {
 
 const std::vector<Effect> kEffects = {
     {"chromatic_aberration", "lens.chromatic_aberration.red=0.01", {"chromatic_aberration"}},
-    {"coat", "surface.coat.roughness=0.2", {"coat", "glint_paths"}},
+    {"coat", "surface.coat.roughness=0.2", {"coat", "glint_paths", "light_paths"}},
     {"defocus", "lens.defocus.aperture_mm=0.3", {"defocus"}},
     {"jpeg", "sensor.jpeg.quality=85", {"jpeg"}},
     {"noise", "sensor.noise.read_e=20", {"noise"}},
     {"peristalsis", "peristalsis.amplitude=0.3", {"peristalsis"}},
     {"shutter", "sensor.shutter.exposure=0.5", {"shutter"}},
-    {"subsurface", "surface.subsurface.scattering_per_mm=[1,1,1]", {"subsurface", "tissue_walks"}}};
+    {"subsurface", "surface.subsurface.scattering_per_mm=[1,1,1]", {"subsurface", "tissue_walks"}},
+    {"vessels", "surface.vessels.spacing_mm=12", {"vessels", "vessel_growth", "wall_places"}}};
 
 // Direct light alone, in more pixels than a frame takes bytes that aren't pixels'.
 constexpr int kDirectPixels = 60 * 48;
