@@ -1,13 +1,6 @@
 // Light from other walls that the coat of what is seen mirrors. Its lobe is too narrow for paths that come to
 // it from elsewhere, so they leave in its own directions; it sends on so little that only some of the pixels
-// look, and their paths wait for others of the tile until they fill a packet. Those that don't look take what
-// the tile's places receive on average for what they would see, and those that do are corrected by as much
-// more as they stand for others: with w what the coat sends on, p the chance to look and L̄ that average, a
-// pixel gains
-//
-//   w · (L̄ + [it looks] · (L − L̄)/p),
-//
-// without bias for any L̄ that doesn't depend on who looks (a control variate).
+// look, and their paths wait for others of the tile until they fill a packet.
 #pragma once
 
 #include <algorithm>
@@ -29,7 +22,6 @@ class GlintPaths {
   void Start(const Eye& eye, int block, const CoatedPlaces& places, const SamplerOf& sampler_of,
              int64_t* rays) {
     const Lanes3 origin = OffsetOrigin(places.point, places.normal);
-    unseen_[block] = Lanes{};
     for (int i = 0; i < kLanes; ++i) {
       if (!places.alive[i]) continue;
       const Sampler sampler = sampler_of(i);
@@ -37,9 +29,7 @@ class GlintPaths {
           places.coat->SampleGlint(places.lanes()[i], sampler.Pair(pairs_.Direction(1)));
       // Roulette: the light of those that look is equally bright, which is least noise for their number.
       const float survival = std::min(1.0f, kPathsOfWeight * glint.weight);
-      unseen_[block][i] = glint.weight;
       if (!(sampler.Pair(pairs_.Roulette(1))[0] < survival)) continue;
-      unseen_[block][i] -= glint.weight / survival;
       start_.on[count_] = -1;
       start_.origin.Set(count_, origin[i]);
       start_.direction.Set(count_, glint.incoming);
@@ -66,11 +56,6 @@ class GlintPaths {
     start_.on = LanesI{};
   }
 
-  // Adds what a block's places mirror of the average light, RGB; after Start.
-  void AddAverage(int block, const Vec3f& average) {
-    light_[block] = light_[block] + Broadcast(average) * unseen_[block];
-  }
-
  private:
   // The pixels that look for each that the coat sends on all light of; least time to a given noise, of 3,
   // 4, 6 and 12.
@@ -81,7 +66,6 @@ class GlintPaths {
   BounceStart start_;
   int count_ = 0;
   int16_t block_[kLanes], lane_[kLanes];  // whose the paths are
-  Lanes unseen_[kBlocks];                 // w · (1 − [it looks]/p) of the places
   Lanes3* light_;
 };
 

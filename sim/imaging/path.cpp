@@ -233,27 +233,8 @@ class Tracer {
       shared_paths_.Add(view_.motion ? EyeAt(pixels.y0 + kTileEdge / 2, key, sample) : eye_, seed_, key,
                         sample, &tile, &count->rays, lost);
     }
-    if (glints && options_.shared_paths > 0) AddAverage(pixels, tile, &*glints);
     for (int block = 0; block < kBlocks; ++block) {
       Deposit(pixels, block, sample, tile.indirect[block], tile.mirrored[block], count);
-    }
-  }
-
-  // The light that the tile's places receive on average is what they send by their albedo.
-  static void AddAverage(const TilePixels& pixels, const TileSample<kCoat>& tile, GlintPaths* glints) {
-    Lanes3 sent{}, albedo{};
-    for (int block = 0; block < kBlocks; ++block) {
-      const LanesI kept = tile.places[block].alive & IsFinite(Sum(tile.indirect[block]));
-      sent = sent + Select(kept, tile.indirect[block], Lanes3{});
-      albedo = albedo + Select(kept, tile.places[block].albedo, Lanes3{});
-    }
-    Vec3f average = Vec3f::Zero();
-    for (int i = 0; i < kLanes; ++i) average += sent[i];
-    Vec3f whole = Vec3f::Zero();
-    for (int i = 0; i < kLanes; ++i) whole += albedo[i];
-    for (int c = 0; c < 3; ++c) average[c] = whole[c] > 0 ? average[c] / whole[c] : 0.0f;
-    for (int block = 0; block < kBlocks; ++block) {
-      if (Any(pixels.on[block])) glints->AddAverage(block, average);
     }
   }
 
