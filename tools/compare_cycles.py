@@ -250,8 +250,10 @@ def main():
     with open(out + ".txt", "w") as file:
         print(f"  to 5.5% {needed * each:34.2f} CPU-s ({needed:.1f} samples of {each:.3f} CPU-s; "
               f"{samples} have {100 * noise:.2f}%)", file=file)
-        print(f"  mean, less lumen's {off_by_luminance:+24.3f}%  (R {off[0]:+.3f}%, G {off[1]:+.3f}%, B {off[2]:+.3f}%; "
-              f"Cycles' standard error {100 * noise / math.sqrt(2 * a.size):.3f}%; camera within {off_px:.1f} px)", file=file)
+        print(f"  mean, less lumen's {off_by_luminance:+24.3f}%  "
+              f"(R {off[0]:+.3f}%, G {off[1]:+.3f}%, B {off[2]:+.3f}%; "
+              f"Cycles' standard error {100 * noise / math.sqrt(2 * a.size):.3f}%; "
+              f"camera within {off_px:.1f} px)", file=file)
 
 
 main()

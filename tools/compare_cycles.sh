@@ -10,8 +10,10 @@
 #   SAMPLES=16 THREADS=2               Cycles' samples a pixel, from which noise falls as their inverse root
 set -euo pipefail
 cd "$(dirname "$0")/.."
-command -v blender >/dev/null ||
-  { echo "compare_cycles: Blender is missing: apt-get install --no-install-recommends blender python3-numpy" >&2; exit 1; }
+command -v blender >/dev/null || {
+  echo "compare_cycles: Blender is missing: apt-get install --no-install-recommends blender python3-numpy" >&2
+  exit 1
+}
 
 build=${LUMEN_BUILD:-build}
 samples=${SAMPLES:-16} threads=${THREADS:-2}
