@@ -7,7 +7,6 @@
 #include <cstdint>
 
 #include "sim/imaging/bounce_paths.h"
-#include "sim/imaging/tile.h"
 
 namespace lumen {
 
