@@ -1,7 +1,5 @@
 #include "common/image.h"
 
-#include <OpenImageIO/imagebuf.h>
-#include <OpenImageIO/imagebufalgo.h>
 #include <OpenImageIO/imageio.h>
 
 #include <algorithm>
@@ -88,15 +86,18 @@ struct Depth<float> {
   static bool Fits(TypeDesc format) { return format == TypeDesc::FLOAT || format == TypeDesc::HALF; }
 };
 
+[[noreturn]] void FailToRead(const fs::path& file, OIIO::ImageInput* input) {
+  Fail(file, "damaged or cut short: " + ErrorOr(input->geterror(), "its pixels can't be read"));
+}
+
 // Reads the first `channels` channels of an open file into interleaved pixels.
 template <class T>
 Image<T> ReadPixels(const fs::path& file, OIIO::ImageInput* input, int channels) {
   Image<T> image(input->spec().width, input->spec().height, channels);
-  if (!input->read_image(0, 0, 0, channels, OIIO::BaseTypeFromC<T>::value, image.data.data())) {
-    Fail(file, "damaged or cut short: " + ErrorOr(input->geterror(), "its pixels can't be read"));
-  }
+  if (!input->read_image(0, 0, 0, channels, OIIO::BaseTypeFromC<T>::value, image.data.data()))
+    FailToRead(file, input);
   // Some readers (PNG) deliver what there is of a truncated file and complain only in the end.
-  if (input->has_error()) Fail(file, "damaged or cut short: " + input->geterror());
+  if (input->has_error()) FailToRead(file, input);
   return image;
 }
 
@@ -109,10 +110,10 @@ Image<T> RepeatedGrey(const Image<T>& grey, int channels) {
   return image;
 }
 
+// How many of an open file's channels are read where `channels` are wanted: those, or a single one that is to
+// be repeated.
 template <class T>
-Image<T> Read(const fs::path& file, int channels) {
-  const auto input = Open(file);
-  const OIIO::ImageSpec& spec = input->spec();
+int ChannelsToRead(const fs::path& file, const OIIO::ImageSpec& spec, int channels) {
   bool fits = Depth<T>::Fits(spec.format);
   for (const TypeDesc& format : spec.channelformats) fits = fits && Depth<T>::Fits(format);
   if (!fits) {
@@ -120,14 +121,20 @@ Image<T> Read(const fs::path& file, int channels) {
                    " image is expected");
   }
   const int colours = spec.nchannels - (spec.alpha_channel >= 0 ? 1 : 0);
-  if (colours == 1 && channels > 1 && Depth<T>::kRepeatsGrey) {
-    return RepeatedGrey(ReadPixels<T>(file, input.get(), 1), channels);
-  }
+  if (colours == 1 && channels > 1 && Depth<T>::kRepeatsGrey) return 1;
   if (colours < channels) {
     Fail(file,
          "has " + std::to_string(colours) + " channels, but " + std::to_string(channels) + " are expected");
   }
-  return ReadPixels<T>(file, input.get(), channels);
+  return channels;
+}
+
+template <class T>
+Image<T> Read(const fs::path& file, int channels) {
+  const auto input = Open(file);
+  const int stored = ChannelsToRead<T>(file, input->spec(), channels);
+  Image<T> image = ReadPixels<T>(file, input.get(), stored);
+  return stored == channels ? image : RepeatedGrey(image, channels);
 }
 
 // Writes interleaved pixels of `spec`'s size, channels and type.
@@ -157,32 +164,28 @@ void WriteInteger(const fs::path& file, const Image<T>& image) {
   Write(file, spec, image.data.data());
 }
 
-std::string FontFile() {
-  for (const char* folder :
-       {"/usr/share/fonts/truetype/dejavu", "/usr/share/fonts/dejavu", "/usr/share/fonts/TTF"}) {
-    const fs::path font = fs::path(folder) / "DejaVuSans.ttf";
-    std::error_code ignored;
-    if (fs::exists(font, ignored)) return font.string();
-  }
-  return "";
-}
-
-// OpenImageIO 2.4 draws a box for what isn't ASCII.
-std::string InAscii(const std::string& text) {
-  constexpr std::pair<std::string_view, std::string_view> kReplacements[] = {
-      {"×", "x"}, {"±", "+-"}, {"–", "-"}, {"°", " deg"}, {"…", "..."}};
-  std::string ascii = text;
-  for (const auto& [from, to] : kReplacements) {
-    for (size_t at = ascii.find(from); at != std::string::npos; at = ascii.find(from, at + to.size())) {
-      ascii.replace(at, from.size(), to);
-    }
-  }
-  return ascii;
-}
-
 }  // namespace
 
 Image8 ReadImage8(const fs::path& file, int channels) { return Read<uint8_t>(file, channels); }
+void ReadImage8Rows(const fs::path& file, int channels, const std::function<void(int, const uint8_t*)>& row) {
+  const auto input = Open(file);
+  const OIIO::ImageSpec& spec = input->spec();
+  const int stored = ChannelsToRead<uint8_t>(file, spec, channels);
+  // A tile reaches over rows.
+  constexpr int kBytes = 1 << 20;
+  const int at_once = spec.tile_width > 0 ? spec.height : std::max(1, kBytes / (spec.width * stored));
+  for (int first = 0; first < spec.height; first += at_once) {
+    Image8 rows(spec.width, std::min(at_once, spec.height - first), stored);
+    const bool read = spec.tile_width > 0
+                          ? input->read_image(0, 0, 0, stored, TypeDesc::UINT8, rows.data.data())
+                          : input->read_scanlines(0, 0, spec.y + first, spec.y + first + rows.height, 0, 0,
+                                                  stored, TypeDesc::UINT8, rows.data.data());
+    if (!read) FailToRead(file, input.get());
+    if (stored != channels) rows = RepeatedGrey(rows, channels);
+    for (int y = 0; y < rows.height; ++y) row(first + y, rows.Pixel(0, y));
+  }
+  if (input->has_error()) FailToRead(file, input.get());
+}
 Image16 ReadImage16(const fs::path& file, int channels) { return Read<uint16_t>(file, channels); }
 ImageF ReadImageF(const fs::path& file, int channels) { return Read<float>(file, channels); }
 
@@ -211,20 +214,6 @@ void ReadImageSize(const fs::path& file, int* width, int* height) {
   const auto input = Open(file);
   *width = input->spec().width;
   *height = input->spec().height;
-}
-
-void DrawText(Image8* image, int x, int y, int size_px, const std::string& text, const Rgb8& color,
-              TextAlign align) {
-  static const std::string font = FontFile();
-  if (font.empty() || image->empty()) return;
-  const OIIO::ImageSpec spec(image->width, image->height, image->channels, TypeDesc::UINT8);
-  OIIO::ImageBuf buffer(spec, image->data.data());
-  const float ink[3] = {color[0] / 255.0f, color[1] / 255.0f, color[2] / 255.0f};
-  using AlignX = OIIO::ImageBufAlgo::TextAlignX;
-  const AlignX align_x = align == TextAlign::kLeft     ? AlignX::Left
-                         : align == TextAlign::kCentre ? AlignX::Center
-                                                       : AlignX::Right;
-  OIIO::ImageBufAlgo::render_text(buffer, x, y, InAscii(text), size_px, font, ink, align_x);
 }
 
 }  // namespace lumen

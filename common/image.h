@@ -4,6 +4,7 @@
 #include <array>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <vector>
 
@@ -37,6 +38,12 @@ using ImageF = Image<float>;
 Image8 ReadImage8(const std::filesystem::path& file, int channels);
 Image16 ReadImage16(const std::filesystem::path& file, int channels);
 ImageF ReadImageF(const std::filesystem::path& file, int channels);
+
+// The same row by row, from the top, for files larger than memory should hold: row(y, pixels), of `channels`
+// each. An interlaced PNG and a tiled TIFF are held whole all the same. Throws InputError, where the file is
+// damaged maybe only after its last row.
+void ReadImage8Rows(const std::filesystem::path& file, int channels,
+                    const std::function<void(int, const uint8_t*)>& row);
 
 // Writes an image whole or not at all; the extension chooses the format (TIFF without compression, as
 // C3VD's). Throws InputError.

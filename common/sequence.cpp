@@ -1,6 +1,7 @@
 #include "common/sequence.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <stdexcept>
 
@@ -10,6 +11,7 @@
 #include "common/error.h"
 #include "common/files.h"
 #include "common/frame_files.h"
+#include "common/frame_gains.h"
 #include "common/frame_lines.h"
 #include "common/pose_file.h"
 
@@ -30,21 +32,6 @@ bool IsFile(const fs::path& path) {
   return fs::is_regular_file(path, ignored);
 }
 
-// The gains of [frames], where there are any, with the place to complain about.
-struct Gains {
-  std::vector<double> values;
-  std::optional<ConfigTable> table;
-  std::vector<double> log_errors;  // of estimated ones
-  std::optional<ConfigTable> errors_table;
-};
-
-void ReadGains(const ConfigTable& root, Gains* gains) {
-  const auto frames = root.Optional("frames");
-  if (!frames || !frames->Has("gain")) return;
-  gains->values = frames->Numbers("gain", 0, kPositive);
-  gains->table = frames;
-}
-
 Image8 ReadMask(const fs::path& file, const CameraIntrinsics& camera) {
   Image8 mask = ReadImage8(file, 1);
   if (mask.width != camera.width || mask.height != camera.height) {
@@ -55,7 +42,7 @@ Image8 ReadMask(const fs::path& file, const CameraIntrinsics& camera) {
   return mask;
 }
 
-void ReadToml(Sequence* sequence, Gains* gains) {
+void ReadToml(Sequence* sequence, FrameGains* gains) {
   const Config config = Config::Read(sequence->folder / kTomlName);
   const ConfigTable root = config.root();
   root.Choice("format", {"lumen-sequence"});
@@ -70,7 +57,7 @@ void ReadToml(Sequence* sequence, Gains* gains) {
   }
   calibration.light = ReadLight(root.Table("light"));
   calibration.response = ReadResponse(root.Table("response"));
-  ReadGains(root, gains);
+  gains->Read(root);
   if (const auto truth = root.Optional("ground_truth"); truth && truth->Has("mesh")) {
     sequence->ground_truth_mesh = truth->Path("mesh").lexically_normal();
     if (!IsFile(sequence->ground_truth_mesh)) {
@@ -80,22 +67,8 @@ void ReadToml(Sequence* sequence, Gains* gains) {
   config.RejectUnknown();
 }
 
-// Standard errors of what calibration.toml holds.
-void ReadUncertainty(const ConfigTable& root, Gains* gains) {
-  const auto table = root.Optional("uncertainty");
-  if (!table) return;
-  for (const char* key : {"spread", "gamma"}) {
-    if (table->Has(key)) table->Number(key, kNotNegative);
-  }
-  if (!table->Has("log_gain")) return;
-  gains->log_errors = table->Numbers("log_gain", 0, kNotNegative);
-  gains->errors_table = table;
-  const auto frames = root.Optional("frames");
-  if (!frames || !frames->Has("gain")) table->Fail("log_gain", "there is no gain in [frames] that it is of");
-}
-
 // What `lumen calibrate` has found out: whole tables in place of the sequence's own.
-void ReadCalibrationOnTop(Sequence* sequence, Gains* gains) {
+void ReadCalibrationOnTop(Sequence* sequence, FrameGains* gains) {
   const fs::path file = sequence->folder / kCalibrationName;
   if (!IsFile(file)) return;
   const Config config = Config::Read(file);
@@ -105,8 +78,13 @@ void ReadCalibrationOnTop(Sequence* sequence, Gains* gains) {
   if (const auto light = root.Optional("light")) sequence->calibration.light = ReadLight(*light);
   if (const auto response = root.Optional("response"))
     sequence->calibration.response = ReadResponse(*response);
-  ReadGains(root, gains);
-  ReadUncertainty(root, gains);
+  gains->Read(root);
+  gains->ReadErrors(root);
+  if (const auto uncertainty = root.Optional("uncertainty")) {
+    for (const char* key : {"spread", "gamma"}) {
+      if (uncertainty->Has(key)) uncertainty->Number(key, kNotNegative);
+    }
+  }
   config.RejectUnknown();
 }
 
@@ -162,31 +140,9 @@ std::vector<int> Absent(const std::vector<int>& numbers, size_t count) {
   return absent;
 }
 
-// Gains are in the order of the frames that are here, or of those that the pose file knows.
-void AssignGains(const Gains& gains, const std::vector<std::optional<size_t>>& line, size_t lines,
-                 std::vector<SequenceFrame>* frames) {
-  if (!gains.table) return;
-  const bool by_frame = gains.values.size() == frames->size();
-  if (!by_frame && gains.values.size() != lines) {
-    gains.table->Fail("gain", "has " + std::to_string(gains.values.size()) + " elements, but there are " +
-                                  std::to_string(frames->size()) + " frames");
-  }
-  if (gains.errors_table && gains.log_errors.size() != gains.values.size()) {
-    gains.errors_table->Fail("log_gain", "has " + std::to_string(gains.log_errors.size()) +
-                                             " elements, but there are " +
-                                             std::to_string(gains.values.size()) + " gains");
-  }
-  for (size_t i = 0; i < frames->size(); ++i) {
-    if (!by_frame && !line[i]) continue;
-    const size_t at = by_frame ? i : *line[i];
-    (*frames)[i].gain = gains.values[at];
-    if (gains.errors_table) (*frames)[i].log_gain_error = gains.log_errors[at];
-  }
-}
-
 // Poses and gains. Frames without a pose are errors or, on request, left out; so are, in folders of our own,
 // poses without a frame. C3VD's may be a part of a download.
-void AssignPosesAndGains(const Gains& gains, const ReadOptions& options, Sequence* sequence) {
+void AssignPosesAndGains(const FrameGains& gains, const ReadOptions& options, Sequence* sequence) {
   const fs::path file = sequence->folder / kPosesName;
   const std::vector<PoseLine> poses = ReadPoseLines(file);
   for (const PoseLine& line : poses) {
@@ -215,7 +171,7 @@ void AssignPosesAndGains(const Gains& gains, const ReadOptions& options, Sequenc
     sequence->left_out.push_back(counts + "; there is none of frame " +
                                  Ranges(Absent(numbers, poses.size())));
   }
-  AssignGains(gains, *lines, poses.size(), &frames);
+  gains.Assign(*lines, poses.size(), &frames);
   std::vector<SequenceFrame> usable;
   std::vector<int> without_line;
   for (size_t i = 0; i < frames.size(); ++i) {
@@ -290,7 +246,7 @@ Sequence ReadSequence(const fs::path& folder, const ReadOptions& options) {
   Sequence sequence;
   sequence.folder = folder;
   sequence.has_toml = IsFile(folder / kTomlName);
-  Gains gains;
+  FrameGains gains;
   if (sequence.has_toml) {
     ReadToml(&sequence, &gains);
   } else {
@@ -330,6 +286,15 @@ void WriteSequenceHeader(const Sequence& sequence) {
   for (const SequenceFrame& frame : sequence.frames) poses.push_back(frame.world_from_camera);
   WriteFile(folder / kPosesName, PosesText(poses));
   WriteFile(folder / kTomlName, text);
+}
+
+std::vector<int> UniformFrames(int count, int at_most) {
+  const int taken = std::min(count, at_most);
+  std::vector<int> frames;
+  for (int i = 0; i < taken; ++i) {
+    frames.push_back(taken > 1 ? static_cast<int>(std::lround(double(i) * (count - 1) / (taken - 1))) : 0);
+  }
+  return frames;
 }
 
 fs::path FrameFile(const fs::path& folder, int number, const std::string& suffix) {

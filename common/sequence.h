@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -66,8 +67,8 @@ struct ReadOptions {
 };
 
 // Reads sequence.toml (or falls back to C3VD's calibration), calibration.toml on top where there is one
-// ([light], [response] and [frames] gain, each in place of the sequence's own; [uncertainty] has standard
-// errors: log_gain, one a frame, without which gains count as exact; spread; gamma), pose.txt, and finds the
+// ([light], [response] and [frames], each in place of the sequence's own; [uncertainty] has standard errors:
+// log_gain, one a gain, without which gains count as exact; spread; gamma), pose.txt, and finds the
 // frames' files, in the layout of C3VD v1 or v2. Pixels are not read. A C3VD folder may be a part of a
 // download: where it has more poses than colour files, a frame's number is that of its line. Throws
 // InputError naming file and place: unknown or missing keys, no frame at all, a mask of another size, gains
@@ -83,6 +84,10 @@ void LeaveOutUnreadableFrames(Sequence* sequence);
 // written relative to the folder.
 void WriteSequenceHeader(const Sequence& sequence);
 
+// Which of `count` frames are taken where at most `at_most` (>= 1) are: indices, spread uniformly from the
+// first to the last; of one alone, the first.
+std::vector<int> UniformFrames(int count, int at_most);
+
 // The file of frame `number` with one of C3VD's suffixes ("color.png", "depth.tiff", …):
 // folder/0012_color.png.
 std::filesystem::path FrameFile(const std::filesystem::path& folder, int number, const std::string& suffix);
@@ -90,8 +95,14 @@ std::filesystem::path FrameFile(const std::filesystem::path& folder, int number,
 // Colour of a frame, 8-bit RGB, checked against the camera's size. Throws DamagedFrame.
 Image8 ReadColor(const Sequence& sequence, const SequenceFrame& frame);
 
+// The same row by row, from the top: row(y, rgb). Throws DamagedFrame, maybe only after the last row.
+void ReadColorRows(const Sequence& sequence, const SequenceFrame& frame,
+                   const std::function<void(int, const uint8_t*)>& row);
+
 // Pixels that carry image: inside the mask and with a ray. One channel, 255 = yes.
 Image8 ValidPixels(const Calibration& calibration);
+// Those of a row alone. camera: the calibration's.
+std::vector<uint8_t> ValidPixelsOfRow(const Calibration& calibration, const Camera<double>& camera, int y);
 
 // C3VD's encodings. Nothing (no surface) is NaN in float images and 0 in all channels of the files.
 Image16 EncodeDepth(const ImageF& z_mm);      // floor(65535·z/100); beyond 100 mm: 65535

@@ -1,4 +1,6 @@
 // What of a sequence takes reading or looking at pixels.
+#include <algorithm>
+
 #include "common/error.h"
 #include "common/parallel.h"
 #include "common/sequence.h"
@@ -12,26 +14,37 @@ constexpr uint8_t kMaskThreshold = 128;
 }  // namespace
 
 Image8 ReadColor(const Sequence& sequence, const SequenceFrame& frame) {
-  Image8 color;
+  Image8 color(sequence.calibration.camera.width, sequence.calibration.camera.height, 3);
+  ReadColorRows(sequence, frame, [&](int y, const uint8_t* rgb) {
+    std::copy_n(rgb, 3 * static_cast<size_t>(color.width), color.Pixel(0, y));
+  });
+  return color;
+}
+
+void ReadColorRows(const Sequence& sequence, const SequenceFrame& frame,
+                   const std::function<void(int, const uint8_t*)>& row) {
+  const CameraIntrinsics& camera = sequence.calibration.camera;
   try {
-    color = ReadImage8(frame.color, 3);
+    int width = 0, height = 0;
+    ReadImageSize(frame.color, &width, &height);
+    if (width != camera.width || height != camera.height) {
+      throw DamagedFrame(frame.color.string() + ": has " + std::to_string(width) + "×" +
+                         std::to_string(height) + " pixels, the camera " + std::to_string(camera.width) +
+                         "×" + std::to_string(camera.height));
+    }
+    ReadImage8Rows(frame.color, 3, row);
+  } catch (const DamagedFrame&) {
+    throw;
   } catch (const InputError& error) {
     throw DamagedFrame(error.what());
   }
-  const CameraIntrinsics& camera = sequence.calibration.camera;
-  if (color.width != camera.width || color.height != camera.height) {
-    throw DamagedFrame(frame.color.string() + ": has " + std::to_string(color.width) + "×" +
-                       std::to_string(color.height) + " pixels, the camera " + std::to_string(camera.width) +
-                       "×" + std::to_string(camera.height));
-  }
-  return color;
 }
 
 void LeaveOutUnreadableFrames(Sequence* sequence) {
   std::vector<std::string> problem(sequence->frames.size());
   ParallelFor(0, static_cast<int64_t>(problem.size()), [&](int64_t i) {
     try {
-      ReadColor(*sequence, sequence->frames[i]);
+      ReadColorRows(*sequence, sequence->frames[i], [](int, const uint8_t*) {});
     } catch (const DamagedFrame& error) {
       problem[i] = error.what();
     }
@@ -53,11 +66,17 @@ Image8 ValidPixels(const Calibration& calibration) {
   Image8 valid(calibration.camera.width, calibration.camera.height, 1);
   ParallelFor(0, valid.height, [&](int64_t row) {
     const int y = static_cast<int>(row);
-    for (int x = 0; x < valid.width; ++x) {
-      const bool masked_out = !calibration.mask.empty() && *calibration.mask.Pixel(x, y) < kMaskThreshold;
-      if (!masked_out && camera.Unproject(Vec2d(x, y))) *valid.Pixel(x, y) = 255;
-    }
+    std::ranges::copy(ValidPixelsOfRow(calibration, camera, y), valid.Pixel(0, y));
   });
+  return valid;
+}
+
+std::vector<uint8_t> ValidPixelsOfRow(const Calibration& calibration, const Camera<double>& camera, int y) {
+  std::vector<uint8_t> valid(calibration.camera.width, 0);
+  for (int x = 0; x < calibration.camera.width; ++x) {
+    const bool masked_out = !calibration.mask.empty() && *calibration.mask.Pixel(x, y) < kMaskThreshold;
+    if (!masked_out && camera.Unproject(Vec2d(x, y))) valid[x] = 255;
+  }
   return valid;
 }
 

@@ -273,6 +273,21 @@ TEST_F(Calibrated, TrainingStartsAtTheGainsAndRefinesThem) {
   EXPECT_EQ(moved, frames.size() - 1);  // but the first
 }
 
+// Where others' gains are given the first frame's isn't 1 for want of a better number.
+TEST_F(Calibrated, AFirstFrameWithoutGainIsLearntBesideTheOthers) {
+  Sequence sequence = *sequence_;
+  sequence.frames[0].gain.reset();
+  const TrainingFrames frames(sequence, 8, true);
+  EXPECT_TRUE(frames.learns_first_gain());
+  EXPECT_FALSE(TrainingFrames(*sequence_, 8, true).learns_first_gain());
+  Trainer trainer(frames, ReadTrainOptions("fast", {}), 0);
+  for (int i = 0; i < 10; ++i) trainer.Step(i / 10.0);
+  EXPECT_NE(trainer.state().log_gain[0], 0);
+  for (int i = 1; i < frames.size(); ++i) EXPECT_EQ(trainer.state().log_gain[i], 0);
+  for (SequenceFrame& frame : sequence.frames) frame.gain.reset();
+  EXPECT_FALSE(TrainingFrames(sequence, 8, true).learns_first_gain());
+}
+
 TEST_F(Calibrated, OneFrameIsRefusedInOneLine) {
   Sequence one = *sequence_;
   one.frames.resize(1);

@@ -215,6 +215,47 @@ TEST(Download, DamagedFramesAreRefusedOrLeftOut) {
   EXPECT_EQ(evaluated.said.substr(0, named.size()), named);
 }
 
+// The gains of the frames that are left are estimated, and stay those frames' own whoever reads them.
+TEST(Download, DamagedFramesAreLeftOutOfACalibration) {
+  const ScratchFolder scratch;
+  const fs::path folder = scratch / "trans_t1_a";
+  Download(SmallDownload(), folder, AsItIs);
+  const std::string png = ReadFile(folder / "0001_color.png");
+  Replace(folder / "0001_color.png", png.substr(0, png.size() / 2));
+  const std::string calibrate = "calibrate '" + folder.string() +
+                                "' --set surface.iterations=30 --set surface.cell_mm=2 "
+                                "--set places.count=300 --set places.shared=2";
+  const std::string cut =
+      (folder / "0001_color.png").string() + ": damaged or cut short: the PNG file has no end; ";
+  const Outcome refused = Lumen(calibrate);
+  EXPECT_EQ(refused.exit_code, 1);
+  EXPECT_EQ(refused.said, "lumen: " + cut + "--skip-damaged uses the other frames\n");
+  const Outcome calibrated = Lumen(calibrate + " --skip-damaged");
+  ASSERT_EQ(calibrated.exit_code, 0) << calibrated.said;
+  EXPECT_EQ(calibrated.said.substr(0, cut.size()), cut);
+  const std::string toml = ReadFile(folder / "calibration.toml");
+  EXPECT_NE(toml.find("number = [0, 2, 3, 4]"), std::string::npos) << toml;
+
+  // With all frames in place the one that was damaged has no gain, the others theirs.
+  Replace(folder / "0001_color.png", png);
+  const Sequence whole = ReadSequence(folder);
+  ASSERT_EQ(whole.frames.size(), 5u);
+  for (const SequenceFrame& frame : whole.frames) {
+    EXPECT_EQ(frame.gain.has_value(), frame.number != 1);
+    EXPECT_EQ(frame.log_gain_error.has_value(), frame.number != 1);
+  }
+  EXPECT_EQ(whole.frames[0].gain, 1);
+  fs::remove(folder / "0001_color.png");
+  const Sequence part = ReadSequence(folder, {.skip_damaged = true});
+  ASSERT_EQ(part.frames.size(), 4u);
+  for (const SequenceFrame& frame : part.frames)
+    EXPECT_EQ(frame.gain, whole.frames[static_cast<size_t>(frame.number)].gain);
+  // Training goes on from them.
+  const Outcome trained = Lumen("train '" + folder.string() + "' -o '" + (scratch / "run").string() + "'" +
+                                kFewSteps + " --skip-damaged");
+  EXPECT_EQ(trained.exit_code, 0) << trained.said;
+}
+
 // Small folders of our own from here on.
 
 constexpr char kToml[] = R"(format = "lumen-sequence"
@@ -322,6 +363,33 @@ TEST_F(DamagedSequence, ALineCutShortAndAPictureOfAnotherSize) {
             (std::vector<std::string>{
                 Poses(":4: a pose is 16 numbers, camera to world, but here are 11; frame 3 is left out"),
                 Color(0).string() + ": has 6×8 pixels, the camera 8×6; the frame is left out"}));
+}
+
+// Gains by frame number hold whichever frames and lines are here; the others' are unknown.
+TEST_F(DamagedSequence, GainsOfSomeFrames) {
+  const auto with_gains = [&](const std::string& frames) {
+    const std::string toml = kToml;
+    WriteFile(scratch_ / "sequence.toml", toml.substr(0, toml.find("[frames]")) + "[frames]\n" + frames);
+  };
+  with_gains("number = [0, 2, 7]\ngain = [1, 3, 9]\n");
+  for (const bool whole : {true, false}) {
+    if (!whole) fs::remove(Color(1));
+    for (const SequenceFrame& frame : ReadSequence(scratch_.path(), {.skip_damaged = true}).frames) {
+      EXPECT_EQ(frame.gain.has_value(), frame.number % 2 == 0);
+      EXPECT_EQ(frame.gain.value_or(0), frame.number % 2 == 0 ? frame.number + 1 : 0);
+    }
+  }
+  const auto complaint = [&](const std::string& frames) {
+    with_gains(frames);
+    return ErrorOf([&] { ReadSequence(scratch_.path(), {.skip_damaged = true}); });
+  };
+  EXPECT_NE(complaint("number = [2, 0]\ngain = [1, 2]\n").find("whole numbers in ascending order"),
+            std::string::npos);
+  EXPECT_NE(complaint("number = [0, 1.5]\ngain = [1, 2]\n").find("whole numbers in ascending order"),
+            std::string::npos);
+  EXPECT_NE(complaint("number = [0]\ngain = [1, 2]\n"), "");
+  EXPECT_NE(complaint("number = [8, 9]\ngain = [1, 2]\n").find("none of these frames is here"),
+            std::string::npos);
 }
 
 // Where it can't be told which pose is whose, nothing is guessed.

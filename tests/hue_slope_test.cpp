@@ -5,6 +5,8 @@
 
 #include <cmath>
 
+#include "common/image.h"
+
 namespace lumen {
 namespace {
 
@@ -33,8 +35,9 @@ Image8 Picture(const Response& response, const Red& red, const Blue& blue) {
 }
 
 double SlopeOf(const Response& response, const Image8& picture, const Image8& valid) {
-  HueSlope hue;
-  hue.Add(picture, valid, response);
+  HueSlope hue(response, kWidth, kHeight,
+               [&](int y) { return std::vector<uint8_t>(valid.Pixel(0, y), valid.Pixel(0, y) + kWidth); });
+  for (int y = 0; y < kHeight; ++y) hue.AddRow(y, picture.Pixel(0, y));
   return hue.Slope();
 }
 
@@ -55,23 +58,26 @@ TEST(HueSlope, TellsLightBetweenWallsFromTheWallsHue) {
   Response response;
   response.gamma = 2.2;
   const auto blue = [](double g) { return 0.9 * g; };
-  const Image8 direct = Picture(response, [](double g) { return 2.5 * g; }, blue);
+  const Image8 direct = Picture(
+      response, [](double g) { return 2.5 * g; }, blue);
   EXPECT_GT(SlopeOf(response, direct, Everywhere()), kHueSlopeOfWallLight / 3);
-  const Image8 mixed = Picture(response, [](double g) { return 2 * g + 0.03; }, blue);
+  const Image8 mixed = Picture(
+      response, [](double g) { return 2 * g + 0.03; }, blue);
   EXPECT_LT(SlopeOf(response, mixed, Everywhere()), 2 * kHueSlopeOfWallLight);
 }
 
 TEST(HueSlope, IsNothingWhereNothingTells) {
   Response response;
   response.gamma = 2.2;
-  const Image8 grey = Picture(response, [](double g) { return g; }, [](double g) { return g; });
+  const Image8 grey = Picture(
+      response, [](double g) { return g; }, [](double g) { return g; });
   EXPECT_NEAR(SlopeOf(response, grey, Everywhere()), 0, 1e-12);
-  const Image8 red = Picture(response, [](double g) { return 2 * std::sqrt(g); }, [](double g) { return g; });
+  const Image8 red = Picture(
+      response, [](double g) { return 2 * std::sqrt(g); }, [](double g) { return g; });
   EXPECT_EQ(SlopeOf(response, red, Image8(kWidth, kHeight, 1)), 0);  // no pixel carries image
   Image8 saturated = red;
   std::fill(saturated.data.begin(), saturated.data.end(), uint8_t{255});
   EXPECT_EQ(SlopeOf(response, saturated, Everywhere()), 0);
-  EXPECT_EQ(HueSlope().Slope(), 0);
 }
 
 }  // namespace

@@ -96,6 +96,23 @@ TEST(Image, GreyIsRepeatedAndAlphaLeftOut) {
   EXPECT_EQ(ReadImage8(scratch / "rgba.png", 3).data, (std::vector<uint8_t>{200, 100, 50, 10, 20, 30}));
 }
 
+// Row by row a file says what it does whole, in order; larger than what is read at a time (2^20 bytes).
+TEST(Image, RowsAreThoseOfTheWhole) {
+  const test::ScratchFolder scratch;
+  WriteImage(scratch / "a.png", Pattern<uint8_t>(701, 907, 3));
+  WriteImage(scratch / "a.tiff", Pattern<uint8_t>(61, 47, 3));
+  WriteImage(scratch / "grey.png", Pattern<uint8_t>(1300, 830, 1));
+  for (const char* name : {"a.png", "a.tiff", "grey.png"}) {
+    const Image8 whole = ReadImage8(scratch / name, 3);
+    int next = 0;
+    ReadImage8Rows(scratch / name, 3, [&](int y, const uint8_t* row) {
+      EXPECT_EQ(y, next++);
+      EXPECT_TRUE(std::equal(row, row + 3 * whole.width, whole.Pixel(0, y))) << name << " " << y;
+    });
+    EXPECT_EQ(next, whole.height) << name;
+  }
+}
+
 TEST(Image, AnotherDepthOrFewerChannelsAreErrors) {
   const test::ScratchFolder scratch;
   WriteImage(scratch / "8.png", Pattern<uint8_t>(4, 4, 1));
@@ -123,7 +140,10 @@ TEST(Image, TruncatedFilesAreErrors) {
     for (const double part : {0.0, 0.001, 0.01, 0.1, 0.5, 0.9, 0.97}) {
       WriteFile(cut, bytes.substr(0, static_cast<size_t>(part * static_cast<double>(bytes.size()))));
       std::string error;
-      if (extension == ".png") error = ErrorOf([&] { ReadImage8(cut, 3); });
+      if (extension == ".png") {
+        error = ErrorOf([&] { ReadImage8(cut, 3); });
+        EXPECT_EQ(ErrorOf([&] { ReadImage8Rows(cut, 3, [](int, const uint8_t*) {}); }), error);
+      }
       if (extension == ".tiff") error = ErrorOf([&] { ReadImage16(cut, 3); });
       if (extension == ".exr") error = ErrorOf([&] { ReadImageF(cut, 2); });
       EXPECT_TRUE(error.starts_with(cut.string() + ": ")) << extension << " " << part << ": " << error;

@@ -5,14 +5,16 @@
 
 #include <map>
 
+#include "common/files.h"
 #include "common/random.h"
+#include "tests/child_process.h"
 #include "tests/small_sequence.h"
 
 namespace lumen {
 namespace {
 
 TEST(SpreadEvenly, TakesOneOfEachPart) {
-  const std::vector<size_t> places = SpreadEvenly(1001, 100);
+  const std::vector<uint32_t> places = SpreadEvenly(1001, 100);
   ASSERT_EQ(places.size(), 100u);
   for (size_t i = 0; i < 100; ++i) {
     EXPECT_GE(places[i], 1001 * i / 100);
@@ -22,8 +24,8 @@ TEST(SpreadEvenly, TakesOneOfEachPart) {
   std::map<size_t, int> of_part;
   for (size_t i = 0; i < 100; ++i) ++of_part[places[i] - 1001 * i / 100];
   EXPECT_GE(of_part.size(), 8u);
-  EXPECT_EQ(SpreadEvenly(3, 3), (std::vector<size_t>{0, 1, 2}));
-  EXPECT_EQ(SpreadEvenly(3, 10), (std::vector<size_t>{0, 1, 2}));
+  EXPECT_EQ(SpreadEvenly(3, 3), (std::vector<uint32_t>{0, 1, 2}));
+  EXPECT_EQ(SpreadEvenly(3, 10), (std::vector<uint32_t>{0, 1, 2}));
   EXPECT_TRUE(SpreadEvenly(0, 10).empty());
 }
 
@@ -44,7 +46,8 @@ TEST(TrainingFrames, KeepsToItsMemory) {
   const int count = static_cast<int>(sequence.frames.size());
   // Unlit: what is observed is the pixel itself, whatever scale the normalisation finds.
   const TrainingFrames all(sequence, count, false);
-  const size_t bytes = 20'000, bytes_a_pixel = 20 + 3 * size_t(count);
+  const size_t bytes = 20'000, bytes_a_pixel = 24 + 3 * size_t(count);
+  ASSERT_TRUE(sequence.calibration.mask.empty());
   ASSERT_GT(all.pixel_rays().size() * bytes_a_pixel, 2 * bytes);
   const TrainingFrames some(sequence, count, false, bytes);
   EXPECT_EQ(some.pixel_rays().size(), bytes / bytes_a_pixel);
@@ -57,12 +60,51 @@ TEST(TrainingFrames, KeepsToItsMemory) {
     ASSERT_NE(same, whole.end());
     EXPECT_EQ(same->second, observed);
   }
-  // And all of them show on the whole what all pixels do: one of each part of neighbours in a row, the mean of
-  // a few hundred is within 4 standard errors if they vary by no more than their mean itself.
+  // And all of them show on the whole what all pixels do: one of each part of neighbours in a row, the mean
+  // of a few hundred is within 4 standard errors if they vary by no more than their mean itself.
   const double tolerance = 4 / std::sqrt(double(some.pixel_rays().size()));
   for (int c = 0; c < 3; ++c) {
     EXPECT_NEAR(some.MeanRadiance(0)[c] / all.MeanRadiance(0)[c], 1, tolerance);
   }
+}
+
+// Peak memory of a run of one step, bytes.
+size_t PeakOfTraining(const std::filesystem::path& sequence, const std::filesystem::path& run) {
+  const pid_t child = test::StartLumen({"train", sequence.string(), "-o", run.string(), "--iterations", "1",
+                                        "--set", "extract.cell_mm=8", "--quiet", "--threads", "1"});
+  int status = 0;
+  rusage usage;
+  wait4(child, &status, 0, &usage);
+  EXPECT_EQ(status, 0);
+  return size_t(usage.ru_maxrss) * 1024;
+}
+
+// Of a frame of 4096 × 4096 pixels, 50 MB, 27 bytes a pixel are kept, as many as fit into half of kFrameBytes
+// at least. What comes on top of that over a frame of 64 × 64 is the mask's 17 MB, while that is read its
+// file's and the rows': less than 12 MB, so that the frame isn't held whole.
+TEST(TrainingFrames, AFrameOf4096SquaredIsNotHeldWhole) {
+  const test::ScratchFolder scratch;
+  const auto peak = [&](int side) {
+    Sequence sequence;
+    sequence.folder = scratch / std::to_string(side);
+    CreateFolder(sequence.folder);
+    Calibration& calibration = sequence.calibration;
+    calibration.light = EndomapperLight();
+    calibration.response.gamma = 2.2;
+    CameraIntrinsics& camera = calibration.camera;
+    camera.width = camera.height = side;
+    camera.cx = camera.cy = (side - 1) / 2.0;
+    camera.fx = camera.fy = 0.6 * side;
+    calibration.mask = Image8(side, side, 1, 255);
+    sequence.frames.resize(1);
+    WriteSequenceHeader(sequence);
+    WriteImage(FrameFile(sequence.folder, 0, "color.png"), Image8(side, side, 3, 90));
+    return PeakOfTraining(sequence.folder, scratch / "run");
+  };
+  const size_t small = peak(64), large = peak(4096);
+  constexpr size_t kMask = size_t{4096} * 4096;
+  EXPECT_LT(large - small, kFrameBytes + 12'000'000);
+  EXPECT_GT(large - small, kFrameBytes - kMask);  // so much it does keep
 }
 
 }  // namespace

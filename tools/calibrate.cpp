@@ -7,12 +7,13 @@
 #include "common/progress.h"
 #include "recon/calibration/calibration_report.h"
 #include "tools/options.h"
+#include "tools/sequence_arguments.h"
 
 namespace lumen {
 namespace {
 
 struct Arguments {
-  std::filesystem::path sequence;
+  SequenceArguments sequence;
   std::vector<std::string> settings;
   bool everything = false;
 };
@@ -41,7 +42,7 @@ CalibrateOptions ReadOptions(const std::vector<std::string>& settings) {
 
 nlohmann::json Run(const Arguments& arguments, const CommonOptions& common) {
   CalibrateOptions options = ReadOptions(arguments.settings);
-  const Sequence sequence = ReadSequence(arguments.sequence, {.calibration = false});
+  const Sequence sequence = ReadSequence(arguments.sequence, false);
   options.light = arguments.everything || !sequence.has_toml;
   const SequenceCalibration found = Calibrate(sequence, options, common.seed);
   const Findings findings = FindingsOf(sequence, found, arguments.everything);
@@ -55,11 +56,11 @@ nlohmann::json Run(const Arguments& arguments, const CommonOptions& common) {
 
 void AddCalibrate(CLI::App* app) {
   const auto arguments = std::make_shared<Arguments>();
-  CLI::App* command = AddSubcommand(app, "calibrate",
-                                    "estimates each frame's gain and, where the data tell, spread and gamma",
-                                    [=](const CommonOptions& common) { return Run(*arguments, common); });
-  command->add_option("SEQ", arguments->sequence, "the sequence folder; calibration.toml is written into it")
-      ->required();
+  CLI::App* command = AddSubcommand(
+      app, "calibrate",
+      "estimates each frame's gain and, where the data tell, spread and gamma, into SEQ/calibration.toml",
+      [=](const CommonOptions& common) { return OfferingToSkip([&] { return Run(*arguments, common); }); });
+  AddSequenceArguments(command, &arguments->sequence, "SEQ");
   command->add_flag("--everything", arguments->everything,
                     "write also what sequence.toml says itself: it is read in its place from then on");
   command

@@ -10,8 +10,8 @@ void AddSequenceArguments(CLI::App* command, SequenceArguments* arguments, const
                     "leave out, naming them, frames that are missing, damaged or without a good pose");
 }
 
-Sequence ReadSequence(const SequenceArguments& arguments) {
-  Sequence sequence = ReadSequence(arguments.folder, {.skip_damaged = arguments.skip_damaged});
+Sequence ReadSequence(const SequenceArguments& arguments, bool calibration) {
+  Sequence sequence = ReadSequence(arguments.folder, {arguments.skip_damaged, calibration});
   if (arguments.skip_damaged) LeaveOutUnreadableFrames(&sequence);
   for (const std::string& line : sequence.left_out) Say(line);
   return sequence;

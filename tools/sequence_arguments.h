@@ -18,8 +18,9 @@ struct SequenceArguments {
 // Adds the folder as positional argument `name` and --skip-damaged.
 void AddSequenceArguments(CLI::App* command, SequenceArguments* arguments, const std::string& name);
 
-// Says what is left out. With --skip-damaged every colour file is read once.
-Sequence ReadSequence(const SequenceArguments& arguments);
+// Says what is left out. With --skip-damaged every colour file is read once. calibration: false leaves
+// calibration.toml unread.
+Sequence ReadSequence(const SequenceArguments& arguments, bool calibration = true);
 
 // run(), whose complaint of a damaged frame gains the remedy.
 template <class Run>

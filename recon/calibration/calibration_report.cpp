@@ -60,13 +60,16 @@ std::string CalibrationText(const Sequence& sequence, const SequenceCalibration&
     uncertainty += fmt::format("gamma = {:.6g}\n", found.gamma.standard_error);
   }
   if (findings.gains) {
-    std::string gains, errors;
-    for (const Estimate& gain : found.log_gain) {
+    std::string numbers, gains, errors;
+    for (size_t i = 0; i < found.log_gain.size(); ++i) {
       const char* comma = gains.empty() ? "" : ", ";
-      gains += fmt::format("{}{:.6g}", comma, std::exp(gain.value));
-      errors += fmt::format("{}{:.6g}", comma, gain.standard_error);
+      numbers += fmt::format("{}{}", comma, sequence.frames[i].number);
+      gains += fmt::format("{}{:.6g}", comma, std::exp(found.log_gain[i].value));
+      errors += fmt::format("{}{:.6g}", comma, found.log_gain[i].standard_error);
     }
-    text += "[frames]\ngain = [" + gains + "]\n\n";
+    text += "[frames]\n";
+    if (!sequence.left_out.empty()) text += "number = [" + numbers + "]    # the others' gains are unknown\n";
+    text += "gain = [" + gains + "]\n\n";
     uncertainty += "log_gain = [" + errors + "]\n";
   }
   return text + uncertainty;

@@ -17,7 +17,8 @@ struct Findings {
 // everything: also what the sequence says itself.
 Findings FindingsOf(const Sequence& sequence, const SequenceCalibration& found, bool everything);
 
-// calibration.toml, which ReadSequence reads on top of the sequence's own files.
+// calibration.toml, which ReadSequence reads on top of the sequence's own files. Where frames of the sequence
+// are left out the gains' frame numbers are written too.
 std::string CalibrationText(const Sequence& sequence, const SequenceCalibration& found,
                             const Findings& findings);
 

@@ -1,27 +1,11 @@
 #include "recon/calibration/quick_surface.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include "common/error.h"
 #include "common/progress.h"
 #include "recon/surface/extract.h"
 #include "recon/training/trainer.h"
 
 namespace lumen {
-namespace {
-
-std::vector<int> UniformFrames(int available, int count) {
-  const int taken = std::min(available, count);
-  std::vector<int> frames;
-  for (int i = 0; i < taken; ++i) {
-    frames.push_back(taken > 1 ? static_cast<int>(std::lround(double(i) * (available - 1) / (taken - 1)))
-                               : 0);
-  }
-  return frames;
-}
-
-}  // namespace
 
 QuickSurface LearnQuickSurface(const Sequence& sequence, const QuickSurfaceOptions& options, uint64_t seed) {
   QuickSurface surface;

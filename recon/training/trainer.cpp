@@ -83,8 +83,9 @@ Trainer::Trainer(const TrainingFrames& frames, const TrainOptions& options, uint
   }
   field_->Initialise(seed, state_.parameters.data());
   norm_.Initialise(state_.parameters.data());
-  // While a wall's share of other walls' light is taken for nothing it looks lit from nearer, and a far one that
-  // has been brought nearer hardly goes back. A single frame has no parallax to tell its depth from its share.
+  // While a wall's share of other walls' light is taken for nothing it looks lit from nearer, and a far one
+  // that has been brought nearer hardly goes back. A single frame has no parallax to tell its depth from its
+  // share.
   if (has_surroundings() && frames.size() > 1 && frames.hue_slope() < kHueSlopeOfWallLight) {
     std::fill_n(&state_.parameters[field_->ambient_bias_begin()], 3, 0.0f);
   }
@@ -254,10 +255,11 @@ void Trainer::UpdateGains(const AdamStep& step) {
     std::fill(chunk.log_gain_gradient.begin(), chunk.log_gain_gradient.end(), 0.0f);
   }
   if (frames_.gains_known() || options_.field.reflectance == Reflectance::kUnlit) return;
-  // The first frame's gain is 1: the others' are relative to it.
-  AdamUpdate(step, gradient.size() - 1, state_.log_gain.data() + 1, gradient.data() + 1,
-             state_.log_gain_first.data() + 1, state_.log_gain_second.data() + 1);
-  for (size_t i = 1; i < gradient.size(); ++i) {
+  // Gains are relative to the first frame's, but where it is unknown beside some that are given.
+  const size_t first = frames_.learns_first_gain() ? 0 : 1;
+  AdamUpdate(step, gradient.size() - first, state_.log_gain.data() + first, gradient.data() + first,
+             state_.log_gain_first.data() + first, state_.log_gain_second.data() + first);
+  for (size_t i = first; i < gradient.size(); ++i) {
     const auto reach = static_cast<float>(frames_.LogGainReach(static_cast<int>(i)));
     state_.log_gain[i] = std::clamp(state_.log_gain[i], -reach, reach);
   }

@@ -1,8 +1,9 @@
 #include "recon/training/training_frames.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
+#include <numeric>
+#include <optional>
 
 #include "common/error.h"
 #include "common/parallel.h"
@@ -27,88 +28,113 @@ double PatternAlong(const Light& light, const Vec3d& ray) {
 
 }  // namespace
 
-std::vector<size_t> SpreadEvenly(size_t available, size_t kept) {
+std::vector<uint32_t> SpreadEvenly(size_t available, size_t kept) {
   kept = std::min(kept, available);
-  std::vector<size_t> places(kept);
+  std::vector<uint32_t> places(kept);
   for (size_t i = 0; i < kept; ++i) {
     const size_t begin = available * i / kept, end = available * (i + 1) / kept;
-    places[i] = begin + RandomBits(0x7370726561640aull, i) % (end - begin);
+    places[i] = static_cast<uint32_t>(begin + RandomBits(0x7370726561640aull, i) % (end - begin));
   }
   return places;
 }
 
 TrainingFrames::TrainingFrames(const Sequence& sequence, int count, bool lit, size_t bytes)
-    : calibration_(sequence.calibration), lit_(lit) {
+    : calibration_{sequence.calibration.camera,
+                   {},
+                   sequence.calibration.light,
+                   sequence.calibration.response},
+      lit_(lit) {
   const int available = static_cast<int>(sequence.frames.size());
   const int taken = std::min(count, available);
-  const size_t bytes_a_pixel = sizeof(Vec3f) + 2 * sizeof(float) + 3 * static_cast<size_t>(taken);
-  const std::vector<size_t> pixels = FindPixels(std::max<size_t>(1, bytes / bytes_a_pixel));
+  const size_t bytes_a_pixel =
+      sizeof(Vec3f) + 2 * sizeof(float) + sizeof(uint32_t) + 3 * static_cast<size_t>(taken);
+  const size_t mask_bytes = std::min(sequence.calibration.mask.data.size(), bytes / 2);
+  const std::vector<uint32_t> pixels =
+      FindPixels(sequence.calibration, std::max<size_t>(1, (bytes - mask_bytes) / bytes_a_pixel));
   if (pixels.empty()) throw InputError(sequence.folder.string() + ": no pixel carries image; check the mask");
   for (int i = 0; i < 256; ++i) decoded_[i] = static_cast<float>(Decode(calibration_.response, i / 255.0));
+  ReadFrames(sequence, UniformFrames(available, taken), pixels);
+  CheckPoses(sequence.folder, numbers_, poses_);
+  if (lit_) FindScale(sequence);
+}
 
-  const Image8 valid = ValidPixels(calibration_);
-  HueSlope hue;
-  for (int i = 0; i < taken; ++i) {
-    const int index =
-        taken > 1 ? static_cast<int>(std::lround(double(i) * (available - 1) / (taken - 1))) : 0;
+void TrainingFrames::ReadFrames(const Sequence& sequence, const std::vector<int>& indices,
+                                const std::vector<uint32_t>& pixels) {
+  const CameraIntrinsics& intrinsics = calibration_.camera;
+  const Camera<double> camera(intrinsics);
+  std::optional<HueSlope> hue;
+  if (lit_) {
+    hue.emplace(calibration_.response, intrinsics.width, intrinsics.height,
+                [&](int y) { return ValidPixelsOfRow(sequence.calibration, camera, y); });
+  }
+  for (const int index : indices) {
     const SequenceFrame& source = sequence.frames[index];
-    const Image8 color = ReadColor(sequence, source);
-    if (lit_) hue.Add(color, valid, calibration_.response);
     Frame frame;
     frame.gain = source.gain.value_or(1.0);
     frame.log_gain_reach = source.gain ? source.log_gain_error.value_or(0.0) : INFINITY;
     gains_known_ = gains_known_ && source.gain.has_value() && !source.log_gain_error;
     frame.rgb.reserve(pixels.size() * 3);
-    for (size_t pixel : pixels) {
-      frame.rgb.insert(frame.rgb.end(), color.data.begin() + 3 * pixel, color.data.begin() + 3 * pixel + 3);
-    }
+    auto pixel = pixels.begin();
+    ReadColorRows(sequence, source, [&](int y, const uint8_t* rgb) {
+      if (hue) hue->AddRow(y, rgb);
+      const size_t row = size_t(y) * intrinsics.width;
+      for (; pixel != pixels.end() && *pixel < row + intrinsics.width; ++pixel) {
+        const uint8_t* kept = rgb + 3 * (*pixel - row);
+        frame.rgb.insert(frame.rgb.end(), kept, kept + 3);
+      }
+    });
     frames_.push_back(std::move(frame));
     numbers_.push_back(source.number);
     poses_.push_back(source.world_from_camera);
   }
-  hue_slope_ = hue.Slope();
-  CheckPoses(sequence.folder, numbers_, poses_);
-  if (lit_) FindScale(sequence);
+  if (hue) hue_slope_ = hue->Slope();
 }
 
-std::vector<size_t> TrainingFrames::FindPixels(size_t most) {
-  const Camera<double> camera(calibration_.camera);
-  const Light& light = calibration_.light;
+std::vector<uint32_t> TrainingFrames::FindPixels(const Calibration& calibration, size_t most) {
+  const Camera<double> camera(calibration.camera);
+  const Light& light = calibration.light;
   // Where the light's pattern is so dark that a wall which saturates the middle is black there, nothing is
   // told; and far enough off its axis a narrow beam's exponential is no float at all.
   double brightest = 0;
   for (const LightSource& source : light.sources)
     brightest = std::max(brightest, PatternAlong(light, source.direction));
   const double darkest = lit_ ? brightest * std::pow(kHalfStep, 1 / inverse_gamma()) : 0;
-
-  Image8 valid = ValidPixels(calibration_);
-  const auto unproject = [&](size_t pixel) {
-    return camera.Unproject(Vec2d(double(pixel % valid.width), double(pixel / valid.width)));
+  // Where vignetting leaves less than half a step, a pixel is black whatever is there.
+  const auto tells = [&](const Vec3d& ray) {
+    return Vignetting(calibration.response, ray.z()) >= kHalfStep && PatternAlong(light, ray) >= darkest;
   };
-  std::atomic<size_t> count = 0;
-  ParallelFor(0, valid.height, [&](int64_t y) {
-    size_t of_row = 0;
-    for (size_t pixel = size_t(y) * valid.width; pixel < size_t(y + 1) * valid.width; ++pixel) {
-      if (valid.data[pixel] == 0) continue;
-      const auto ray = unproject(pixel);
-      // Where vignetting leaves less than half a step, a pixel is black whatever is there.
-      const bool tells = ray && Vignetting(calibration_.response, ray->z()) >= kHalfStep &&
-                         PatternAlong(light, *ray) >= darkest;
-      if (!tells) valid.data[pixel] = 0;
-      of_row += tells;
-    }
-    count += of_row;
+
+  const int width = calibration.camera.width, height = calibration.camera.height;
+  std::vector<std::vector<bool>> rows(height);
+  std::vector<size_t> begin(height + 1, 0);  // of a row's pixels among all that tell something
+  ParallelFor(0, height, [&](int64_t y) {
+    const std::vector<uint8_t> valid = ValidPixelsOfRow(calibration, camera, static_cast<int>(y));
+    rows[y].resize(width);
+    for (int x = 0; x < width; ++x)
+      rows[y][x] = valid[x] != 0 && tells(*camera.Unproject(Vec2d(x, double(y))));
+    begin[y + 1] = static_cast<size_t>(std::ranges::count(rows[y], true));
   });
-  std::vector<size_t> pixels = SpreadEvenly(count, most);  // among those that are left, so far
-  size_t place = 0, kept = 0;
-  for (size_t pixel = 0; kept < pixels.size(); ++pixel) {
-    if (valid.data[pixel] == 0 || place++ != pixels[kept]) continue;
-    pixels[kept++] = pixel;
-    const Vec3d ray = *unproject(pixel);
-    rays_.push_back(ray.cast<float>());
-    vignetting_.push_back(static_cast<float>(Vignetting(calibration_.response, ray.z())));
-    pattern_.push_back(static_cast<float>(PatternAlong(light, ray)));
-  }
+  std::partial_sum(begin.begin(), begin.end(), begin.begin());
+
+  std::vector<uint32_t> pixels = SpreadEvenly(begin.back(), most);  // among those that tell something, so far
+  rays_.resize(pixels.size());
+  vignetting_.resize(pixels.size());
+  pattern_.resize(pixels.size());
+  // A row looks up and replaces its own places only.
+  std::vector<size_t> first(height + 1);
+  for (int y = 0; y <= height; ++y)
+    first[y] = static_cast<size_t>(std::ranges::lower_bound(pixels, begin[y]) - pixels.begin());
+  ParallelFor(0, height, [&](int64_t y) {
+    size_t kept = first[y], place = begin[y];
+    for (int x = 0; x < width && kept < first[y + 1]; ++x) {
+      if (!rows[y][x] || place++ != pixels[kept]) continue;
+      const Vec3d ray = *camera.Unproject(Vec2d(x, double(y)));
+      rays_[kept] = ray.cast<float>();
+      vignetting_[kept] = static_cast<float>(Vignetting(calibration.response, ray.z()));
+      pattern_[kept] = static_cast<float>(PatternAlong(light, ray));
+      pixels[kept++] = static_cast<uint32_t>(y * width + x);
+    }
+  });
   return pixels;
 }
 
@@ -147,6 +173,11 @@ void TrainingFrames::FindScale(const Sequence& sequence) {
 }
 
 double TrainingFrames::LogGainReach(int frame) const { return frames_[frame].log_gain_reach; }
+
+bool TrainingFrames::learns_first_gain() const {
+  return std::isinf(frames_[0].log_gain_reach) &&
+         std::ranges::any_of(frames_, [](const Frame& frame) { return std::isfinite(frame.log_gain_reach); });
+}
 
 Vec3d TrainingFrames::MeanRadiance(int frame) const {
   Vec3d sum = Vec3d::Zero();

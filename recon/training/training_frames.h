@@ -10,21 +10,22 @@
 
 namespace lumen {
 
-// What the frames' pixels may take up, bytes. 20 frames of 1350×1080 fit in whole. Of more or larger ones a
-// part of the pixels is kept, the same of every frame and spread evenly: a run of 6,000 iterations looks
-// at 1.5 million rays in all, and even 700 frames keep 42 million pixels.
+// What the frames' pixels may take up with the sequence's mask, bytes. 20 frames of 1350×1080 fit in whole.
+// Of more or larger ones a part of the pixels is kept, the same of every frame and spread evenly: a run of
+// 6,000 iterations looks at 1.5 million rays in all, and even 700 frames keep 42 million pixels. While frames
+// are read, row by row, a megabyte of rows comes on top and a bit a pixel of the image.
 inline constexpr size_t kFrameBytes = 128'000'000;
 
 // `kept` of `available` places in ascending order, one at random in each of as many equal parts; all of them,
 // if kept ≥ available.
-std::vector<size_t> SpreadEvenly(size_t available, size_t kept);
+std::vector<uint32_t> SpreadEvenly(size_t available, size_t kept);
 
 class TrainingFrames {
  public:
   // Reads `count` frames taken uniformly over the sequence (all, if there are fewer), one after the other.
-  // `lit`: normalise; otherwise pixels stay as they are (NeuS). bytes: see kFrameBytes. Throws InputError: a
-  // frame unreadable, no pixel valid, all pixels black or all saturated, poses that no colon has room for.
-  // Says in a line what is odd about poses and gains.
+  // `lit`: normalise; otherwise pixels stay as they are (NeuS). bytes: see kFrameBytes; the pixels have half
+  // of it at least. Throws InputError: a frame unreadable, no pixel valid, all pixels black or all saturated,
+  // poses that no colon has room for. Says in a line what is odd about poses and gains.
   TrainingFrames(const Sequence& sequence, int count, bool lit, size_t bytes = kFrameBytes);
 
   int size() const { return static_cast<int>(frames_.size()); }
@@ -38,9 +39,11 @@ class TrainingFrames {
   // Of every frame, and for good.
   bool gains_known() const { return gains_known_; }
   // By how much the logarithm of a frame's gain may be off from what the sequence says: one standard error of
-  // an estimate, for a drift of the gains can make up for a far wall that is still too near, and training left
-  // to itself strays that way; infinite where it says nothing, 0 where it knows.
+  // an estimate, for a drift of the gains can make up for a far wall that is still too near, and training
+  // left to itself strays that way; infinite where it says nothing, 0 where it knows.
   double LogGainReach(int frame) const;
+  // Whether the first frame's gain is unknown and others' are not; if all are unknown, it is 1.
+  bool learns_first_gain() const;
   // Over the frames taken (HueSlope).
   double hue_slope() const { return hue_slope_; }
   // 1/γ of the comparison; for an sRGB response that of the 2.2 which approximates it.
@@ -61,11 +64,13 @@ class TrainingFrames {
     double log_gain_reach;
   };
   double Normaliser(size_t pixel) const;  // vignetting · L_e
-  // Fills what there is one of a pixel; their places in the image.
-  std::vector<size_t> FindPixels(size_t most);
+  // Fills what there is one of a pixel; their places in the image, ascending.
+  std::vector<uint32_t> FindPixels(const Calibration& calibration, size_t most);
+  void ReadFrames(const Sequence& sequence, const std::vector<int>& indices,
+                  const std::vector<uint32_t>& pixels);
   void FindScale(const Sequence& sequence);
 
-  Calibration calibration_;
+  Calibration calibration_;  // without its mask
   bool lit_;
   bool gains_known_ = true;
   double hue_slope_ = 0;

@@ -94,16 +94,6 @@ void TakeNumbers(const std::vector<double>& numbers, bool is_scene, TableRow* ro
   if (is_scene) row->data = numbers[12] != 0 ? TableData::kTwinOfStandIn : TableData::kTwin;
 }
 
-// Which of `count` frames are taken: at most so many, uniformly, as training takes them.
-std::vector<int> UniformFrames(int count, int at_most) {
-  const int taken = std::min(count, at_most);
-  std::vector<int> frames;
-  for (int i = 0; i < taken; ++i) {
-    frames.push_back(taken > 1 ? static_cast<int>(std::lround(double(i) * (count - 1) / (taken - 1))) : 0);
-  }
-  return frames;
-}
-
 std::vector<SequenceFrame> Taken(const std::vector<SequenceFrame>& frames, int at_most) {
   std::vector<SequenceFrame> taken;
   for (const int i : UniformFrames(static_cast<int>(frames.size()), at_most)) taken.push_back(frames[i]);
