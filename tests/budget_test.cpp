@@ -34,46 +34,129 @@ std::vector<std::string> Names(const std::vector<BudgetEffect>& effects) {
   return names;
 }
 
-TEST(BudgetEffects, AreTheScenesOwnThenWhatTheReconstructorLacks) {
-  const Scene scene = SmallScene({"response.vignetting=1"});
-  const std::vector<BudgetEffect> effects = BudgetEffectsOf(scene, "scene");
-  EXPECT_EQ(Names(effects),
-            (std::vector<std::string>{"interreflection", "texture", "offset_guides", "vignetting_unknown",
-                                      "auto_gain", "gains_unknown", "pose_noise", "half_the_frames"}));
-  // With all of them left out the paper's assumptions hold.
-  Scene ideal = scene;
-  for (const BudgetEffect& effect : effects)
-    if (effect.leave_out) effect.leave_out(&ideal);
+// As `lumen budget` has it: with what the scene doesn't name.
+Scene WholeScene(std::vector<std::string> settings) {
+  for (const std::string& missing : MissingInBudget(SmallScene(settings))) settings.push_back(missing);
+  Scene scene = SmallScene(settings);
+  SetBudgetExposure(&scene);
+  return scene;
+}
+
+void LeaveOutAll(Scene* scene) {
+  for (const BudgetEffect& effect : BudgetEffectsOf(*scene))
+    if (effect.reduce_to) effect.reduce_to(0, scene);
+}
+
+TEST(BudgetEffects, AreAllThatTheStudyIsAboutWhateverTheSceneNames) {
+  const std::vector<std::string> expected = {"bounces",
+                                             "coat",
+                                             "subsurface",
+                                             "offset_guides",
+                                             "vignetting_unknown",
+                                             "motion_blur",
+                                             "rolling_shutter",
+                                             "sensor_noise",
+                                             "gains_unknown",
+                                             "pose_noise",
+                                             "quarter_of_frames"};
+  const Scene lit = WholeScene({});
+  EXPECT_EQ(Names(BudgetEffectsOf(lit)), expected);
+  // What the scene names stays as it is.
+  EXPECT_EQ(lit.path.bounces, 3);
+  EXPECT_EQ(lit.sensor.auto_gain->target, 0.45);
+
+  const Scene plain = WholeScene({"path.bounces=0", "sensor.shutter={exposure = 0.2}",
+                                  "light.source=[{position = [0, 0, 0], direction = [0, 0, 1], spread = 2, "
+                                  "intensity = [3000, 3300, 3600]}]"});
+  EXPECT_EQ(Names(BudgetEffectsOf(plain)), expected);
+  EXPECT_EQ(plain.path.bounces, 8);
+  EXPECT_EQ(plain.sensor.shutter->exposure, 0.2);
+  EXPECT_EQ(plain.sensor.shutter->readout, 0.5);
+  ASSERT_EQ(plain.calibration.light.sources.size(), 3u);
+  for (const LightSource& guide : plain.calibration.light.sources) {
+    EXPECT_EQ(guide.spread, 2);
+    EXPECT_LT((guide.intensity - Vec3d(1000, 1100, 1200)).norm(), 1e-9);
+  }
+  // Those that are not to be had by default are measured where a scene names them.
+  EXPECT_EQ(std::ranges::count(Names(BudgetEffectsOf(WholeScene({"sensor.jpeg={}"}))), "jpeg"), 1);
+}
+
+TEST(BudgetEffects, LeaveThePapersAssumptions) {
+  Scene ideal = WholeScene({"sensor.record_gain=false", "lens.defocus={}"});
+  LeaveOutAll(&ideal);
   EXPECT_EQ(ideal.path.bounces, 0);
-  EXPECT_FALSE(ideal.surface.mottling || ideal.surface.vessels || ideal.sensor.auto_gain);
+  EXPECT_FALSE(ideal.surface.coat || ideal.surface.subsurface || ideal.surface.bounced_coat);
+  EXPECT_FALSE(ideal.sensor.noise || ideal.sensor.shutter || ideal.defocus);
   EXPECT_EQ(ideal.calibration.response.vignetting, 0);
   ASSERT_EQ(ideal.calibration.light.sources.size(), 1u);
   EXPECT_TRUE(ideal.calibration.light.sources[0].position.isZero(0));
-  EXPECT_EQ(ideal.calibration.light.sources[0].intensity, Vec3d(3600, 3600, 3600));
+  EXPECT_LT((ideal.calibration.light.sources[0].intensity - Vec3d(3600, 3600, 3600)).norm(), 1e-9);
+  // Its model has a texture, and a gain a frame that is known.
+  EXPECT_TRUE(ideal.surface.mottling && ideal.surface.vessels && ideal.sensor.auto_gain);
+  EXPECT_TRUE(ideal.sensor.record_gain);
 }
 
-TEST(BudgetEffects, ASceneWithoutEffectsIsRefused) {
-  Scene scene;
-  const std::string error = test::ErrorOf([&] { BudgetEffectsOf(scene, "plain.toml"); });
-  EXPECT_EQ(error.find("plain.toml: "), 0u) << error;
-  EXPECT_NE(error.find("path.bounces"), std::string::npos) << error;
-  EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+TEST(BudgetEffects, EachLeavesTheOthers) {
+  const Scene whole = WholeScene({});
+  for (const BudgetEffect& effect : BudgetEffectsOf(whole)) {
+    if (!effect.reduce_to) continue;
+    Scene scene = whole;
+    for (const BudgetEffect& other : BudgetEffectsOf(whole))
+      if (other.reduce_to && other.name != effect.name) other.reduce_to(0, &scene);
+    const std::vector<bool> there = {scene.path.bounces > 0,
+                                     scene.surface.coat.has_value(),
+                                     scene.surface.subsurface.has_value(),
+                                     scene.calibration.light.sources.size() > 1,
+                                     scene.calibration.response.vignetting > 0,
+                                     scene.sensor.shutter && scene.sensor.shutter->exposure > 0,
+                                     scene.sensor.shutter && scene.sensor.shutter->readout > 0,
+                                     scene.sensor.noise.has_value()};
+    EXPECT_EQ(std::ranges::count(there, true), 1) << effect.name;
+  }
 }
 
-TEST(BudgetVariants, CoverIdealEachAllAndAllButEachOnce) {
+TEST(BudgetEffects, BouncesComeStepByStep) {
+  for (const auto& [bounces, steps] : std::vector<std::pair<int, std::vector<std::string>>>{
+           {1, {"1"}}, {2, {"1", "2"}}, {3, {"1", "2", "3"}}, {8, {"1", "2", "8"}}}) {
+    const Scene scene = WholeScene({"path.bounces=" + std::to_string(bounces)});
+    const BudgetEffect effect = BudgetEffectsOf(scene)[0];
+    ASSERT_EQ(effect.steps, steps);
+    for (int step = 0; step <= effect.whole(); ++step) {
+      Scene reduced = scene;
+      effect.reduce_to(step, &reduced);
+      EXPECT_EQ(reduced.path.bounces, step == 0 ? 0 : std::stoi(steps[step - 1]));
+    }
+  }
+}
+
+TEST(BudgetVariants, CoverIdealEachStepAllAndAllButEachOnce) {
   for (size_t count : {1u, 2u, 3u, 6u}) {
-    std::vector<BudgetEffect> effects(count);
-    for (size_t i = 0; i < count; ++i) effects[i].name = std::string(1, static_cast<char>('a' + i));
-    const std::vector<BudgetVariant> variants = BudgetVariantsOf(effects, true);
-    std::set<std::vector<bool>> different;
-    for (const BudgetVariant& variant : variants) different.insert(variant.on);
-    EXPECT_EQ(different.size(), variants.size()) << count;
-    EXPECT_EQ(variants.front().kind, VariantKind::kIdeal);
-    EXPECT_EQ(variants.size(), count == 1 ? 2 : count == 2 ? 4 : 2 + 2 * count);
-    for (const BudgetVariant& variant : variants) {
-      const auto on = static_cast<size_t>(std::ranges::count(variant.on, true));
-      const size_t expected[] = {0, 1, count, count - 1};
-      EXPECT_EQ(on, expected[int(variant.kind)]) << variant.name;
+    for (int steps : {1, 3}) {  // of the first effect
+      std::vector<BudgetEffect> effects(count);
+      for (size_t i = 0; i < count; ++i) effects[i].name = std::string(1, static_cast<char>('a' + i));
+      if (steps > 1) effects[0].steps = {"1", "2", "8"};
+      const std::vector<BudgetVariant> variants = BudgetVariantsOf(effects, true);
+      std::set<std::vector<int>> different;
+      std::set<std::string> names;
+      for (const BudgetVariant& variant : variants) {
+        different.insert(variant.steps);
+        names.insert(variant.name);
+        int on = 0, whole = 0;
+        for (size_t i = 0; i < count; ++i) {
+          on += variant.steps[i] > 0;
+          whole += variant.steps[i] == effects[i].whole();
+        }
+        const int all = static_cast<int>(count);
+        const int least_on[] = {0, 1, all, all - 1}, most_on[] = {0, 1, all, all};
+        EXPECT_GE(on, least_on[int(variant.kind)]) << variant.name;
+        EXPECT_LE(on, most_on[int(variant.kind)]) << variant.name;
+        EXPECT_TRUE(variant.kind != VariantKind::kAllBut || whole == all - 1) << variant.name;
+      }
+      EXPECT_EQ(different.size(), variants.size()) << count;
+      EXPECT_EQ(names.size(), variants.size()) << count;
+      EXPECT_EQ(variants.front().kind, VariantKind::kIdeal);
+      const size_t more = static_cast<size_t>(steps - 1);
+      EXPECT_EQ(variants.size(), count == 1 ? 2 + more : count == 2 ? 4 + 2 * more : 2 + 2 * (count + more));
     }
   }
 }
@@ -156,7 +239,7 @@ TEST(Budget, MeasuresAndGoesOnFromWhatIsMeasured) {
   SetQuiet(true);
   const Scene scene = SmallScene({"path.bounces=0"});
   std::vector<BudgetEffect> effects;
-  for (const BudgetEffect& effect : BudgetEffectsOf(scene, "scene")) {
+  for (const BudgetEffect& effect : BudgetEffectsOf(scene)) {
     if (effect.name == "offset_guides") effects.push_back(effect);
   }
   BudgetOptions options;

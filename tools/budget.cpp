@@ -20,7 +20,7 @@ struct Arguments : StudyArguments {
 };
 
 // What holds where nothing else is said: differences show long before a run is at its best.
-constexpr double kScale = 0.5, kQuickScale = 0.2;
+constexpr double kScale = 0.3, kQuickScale = 0.2;
 constexpr int64_t kIterations = 1500, kQuickIterations = 250;
 constexpr const char *kCell = "extract.cell_mm=1", *kQuickCell = "extract.cell_mm=2";
 constexpr int kSeeds = 3, kQuickSeeds = 1;
@@ -34,8 +34,16 @@ TrainOptions OwnOptions(const Arguments& arguments) {
   return ReadTrainOptions(train.preset, train.Settings());
 }
 
+// What the command line says and what is needed besides for the scene to have all that a budget is about.
+std::vector<std::string> BudgetSettings(const Arguments& arguments, uint64_t seed, double scale) {
+  std::vector<std::string> settings = arguments.settings;
+  const Scene own = ReadScaledScene(arguments.scene, settings, seed, scale);
+  for (const std::string& setting : MissingInBudget(own)) settings.push_back(setting);
+  return settings;
+}
+
 std::vector<BudgetEffect> EffectsToMeasure(const Arguments& arguments, const Scene& scene) {
-  const std::vector<BudgetEffect> all = BudgetEffectsOf(scene, arguments.scene.string());
+  const std::vector<BudgetEffect> all = BudgetEffectsOf(scene);
   if (arguments.effects.empty()) return all;
   std::vector<BudgetEffect> named;
   for (const std::string& name : arguments.effects) {
@@ -43,7 +51,7 @@ std::vector<BudgetEffect> EffectsToMeasure(const Arguments& arguments, const Sce
     if (effect == all.end()) {
       std::string known;
       for (const BudgetEffect& other : all) known += (known.empty() ? "" : ", ") + other.name;
-      throw InputError("--effect " + name + ": this scene has no such effect; there are: " + known);
+      throw InputError("--effect " + name + ": there is no such effect; there are: " + known);
     }
     named.push_back(*effect);
   }
@@ -51,10 +59,10 @@ std::vector<BudgetEffect> EffectsToMeasure(const Arguments& arguments, const Sce
 }
 
 // The scene without the effects that aren't asked for.
-void LeaveOutOthers(const std::vector<BudgetEffect>& effects, const Arguments& arguments, Scene* scene) {
-  for (const BudgetEffect& effect : BudgetEffectsOf(*scene, arguments.scene.string())) {
+void LeaveOutOthers(const std::vector<BudgetEffect>& effects, Scene* scene) {
+  for (const BudgetEffect& effect : BudgetEffectsOf(*scene)) {
     const bool asked = std::ranges::count(effects, effect.name, &BudgetEffect::name) > 0;
-    if (!asked && effect.leave_out) effect.leave_out(scene);
+    if (!asked && effect.reduce_to) effect.reduce_to(0, scene);
   }
 }
 
@@ -63,8 +71,9 @@ std::string TitleOf(const Arguments& arguments, const Scene& scene, const Budget
   const auto& schedule = options.train.schedule;
   const std::string length = schedule.seconds > 0 ? fmt::format("{} s", schedule.seconds)
                                                   : fmt::format("{} iterations", schedule.iterations);
+  const size_t frames = std::min(scene.world_from_camera.size(), size_t(options.train.frames));
   return fmt::format("{}: {} frames of {}×{} pixels, {}, {} seed{}", arguments.scene.filename().string(),
-                     scene.world_from_camera.size(), camera.width, camera.height, length, options.seeds,
+                     frames, camera.width, camera.height, length, options.seeds,
                      options.seeds == 1 ? "" : "s");
 }
 
@@ -75,10 +84,13 @@ nlohmann::json Run(const Arguments& arguments, const CommonOptions& common) {
   options.seed = common.seed;
   options.folder = arguments.folder;
   const double scale = arguments.scale > 0 ? arguments.scale : arguments.quick ? kQuickScale : kScale;
-  Scene scene = ReadScaledScene(arguments.scene, arguments.settings, common.seed, scale);
+  const std::vector<std::string> settings = BudgetSettings(arguments, common.seed, scale);
+  Scene scene = ReadScaledScene(arguments.scene, settings, common.seed, scale);
+  SetBudgetExposure(&scene);
   const std::vector<BudgetEffect> effects = EffectsToMeasure(arguments, scene);
-  LeaveOutOthers(effects, arguments, &scene);
+  LeaveOutOthers(effects, &scene);
   for (const BudgetEffect& effect : effects) options.subject += "effect = " + effect.name + "\n";
+  for (const std::string& setting : settings) options.subject += setting + "\n";
   options.subject += SubjectOf(arguments, scale, common.seed);
   const Budget budget = MeasureBudget(scene, effects, options);
 
@@ -102,7 +114,7 @@ void AddBudget(CLI::App* app) {
   CLI::App* command =
       AddSubcommand(app, "budget", "millimetres of error per physical effect: a table and a picture",
                     [=](const CommonOptions& common) { return Run(*arguments, common); });
-  AddStudyArguments(command, {"budget", "0.5", "short runs on small frames, one seed: some minutes"},
+  AddStudyArguments(command, {"budget", "0.3", "short runs on small frames, one seed: some minutes"},
                     arguments.get());
   command->add_option("--effect", arguments->effects,
                       "an effect to measure, by its name in the table; the others stay off (default: all)");

@@ -24,7 +24,6 @@ namespace fs = std::filesystem;
 // Completeness doesn't count here.
 constexpr int kCompletenessPoints = 100;
 constexpr double kUnknown = std::numeric_limits<double>::quiet_NaN();
-constexpr char kFixedGain[] = "fixed gain";
 
 struct LightModel {
   std::string name;
@@ -55,15 +54,13 @@ class BudgetMeasurement {
         variants_(BudgetVariantsOf(effects, options.all_but)),
         models_(ModelsOf(options.train)),
         record_((CreateFolder(options.folder), options.folder / "measured.json"), options.subject) {
-    // A run that is to know the gains needs them, whatever the scene keeps to itself.
-    scene_.sensor.record_gain = true;
     // Evaluation takes the mesh: no picture of the truth is looked at.
     scene_.truth = {false, {}};
   }
 
   Budget Measure() {
     // Variants with the same frames, rendered once.
-    std::map<std::vector<bool>, std::vector<Run>> missing;
+    std::map<std::vector<int>, std::vector<Run>> missing;
     for (const Run& run : AllRuns()) {
       ++runs_;
       if (record_.Find(run.key)) {
@@ -96,7 +93,10 @@ class BudgetMeasurement {
   std::string KeyOf(size_t variant, size_t model, uint64_t seed) const {
     std::string key = "effects =";
     for (size_t i = 0; i < effects_.size(); ++i) {
-      if (variants_[variant].on[i]) key += " " + effects_[i].name;
+      const int step = variants_[variant].steps[i];
+      if (step == 0) continue;
+      key += " " + effects_[i].name;
+      if (!effects_[i].steps.empty()) key += ":" + effects_[i].steps[step - 1];
     }
     return key + fmt::format("\nmodel = {}\nseed = {}\n", models_[model].name, seed) +
            FormatTrainOptions(TrainOptionsOf(variant, model));
@@ -105,48 +105,35 @@ class BudgetMeasurement {
   TrainOptions TrainOptionsOf(size_t variant, size_t model) const {
     TrainOptions options = models_[model].options;
     for (size_t i = 0; i < effects_.size(); ++i) {
-      if (variants_[variant].on[i] && effects_[i].restrict) effects_[i].restrict(&options);
+      if (variants_[variant].steps[i] > 0 && effects_[i].restrict) effects_[i].restrict(&options);
     }
     return options;
   }
 
-  // Those that the frames show.
-  std::vector<bool> RenderedEffects(const BudgetVariant& variant) const {
-    std::vector<bool> rendered = variant.on;
+  // As much of each effect as the frames show.
+  std::vector<int> RenderedEffects(const BudgetVariant& variant) const {
+    std::vector<int> rendered = variant.steps;
     for (size_t i = 0; i < effects_.size(); ++i) {
-      if (!effects_[i].leave_out) rendered[i] = false;
+      if (!effects_[i].reduce_to) rendered[i] = 0;
     }
     return rendered;
   }
 
-  Sequence RenderWith(const std::vector<bool>& rendered) {
+  Sequence RenderWith(const std::vector<int>& rendered) const {
     Scene scene = scene_;
     for (size_t i = 0; i < effects_.size(); ++i) {
-      if (effects_[i].leave_out && !rendered[i]) effects_[i].leave_out(&scene);
+      if (effects_[i].reduce_to && rendered[i] < effects_[i].whole())
+        effects_[i].reduce_to(rendered[i], &scene);
     }
-    if (scene_.sensor.auto_gain && !scene.sensor.auto_gain) scene.sensor.gain = FixedGain();
-    return RenderScene(scene);
-  }
-
-  Sequence RenderScene(const Scene& scene) const {
     RenderOptions options;
     options.folder = options_.folder / "sequence";
     options.seed = options_.seed;
+    options.frames = UniformFrames(static_cast<int>(scene.world_from_camera.size()), options_.train.frames);
     Render(scene, options);
     return ReadSequence(options.folder);
   }
 
-  double FixedGain() {
-    if (const auto known = record_.Find(kFixedGain)) return known->at(0);
-    double sum = 0;
-    const Sequence sequence = RenderScene(scene_);
-    for (const SequenceFrame& frame : sequence.frames) sum += std::log(frame.gain.value());
-    const double gain = std::exp(sum / static_cast<double>(sequence.frames.size()));
-    record_.Add(kFixedGain, {gain});
-    return gain;
-  }
-
-  void MeasureRuns(const std::vector<bool>& rendered, const std::vector<Run>& runs) {
+  void MeasureRuns(const std::vector<int>& rendered, const std::vector<Run>& runs) {
     const Sequence sequence = RenderWith(rendered);
     const Mesh truth = ReadGroundTruth(sequence);
     for (const Run& run : runs) {
@@ -161,7 +148,7 @@ class BudgetMeasurement {
   std::vector<double> Errors(const Sequence& sequence, const Mesh& truth, const Run& run) const {
     Sequence told = sequence;
     for (size_t i = 0; i < effects_.size(); ++i) {
-      if (variants_[run.variant].on[i] && effects_[i].keep_unknown) {
+      if (variants_[run.variant].steps[i] > 0 && effects_[i].keep_unknown) {
         effects_[i].keep_unknown(run.seed, &told);
       }
     }
@@ -174,7 +161,8 @@ class BudgetMeasurement {
       Train(told, TrainOptionsOf(run.variant, run.model), train);
       EvaluateOptions evaluate;
       evaluate.completeness_points = kCompletenessPoints;
-      const Evaluation evaluation = Evaluate(ReadMesh(train.folder / "mesh.ply"), truth, sequence, evaluate);
+      const Evaluation evaluation =
+          Evaluate(ReadMesh(train.folder / "mesh.ply"), truth, Surveying(sequence), evaluate);
       if (evaluation.surveyed.error) errors[0] = evaluation.surveyed.error->mae_mm;
       if (evaluation.extended.error) errors[1] = evaluation.extended.error->mae_mm;
     } catch (const InputError& error) {
@@ -182,6 +170,15 @@ class BudgetMeasurement {
     }
     fs::remove_all(train.folder);
     return errors;
+  }
+
+  // The sequence with the poses of all frames, rendered or not.
+  Sequence Surveying(Sequence sequence) const {
+    sequence.frames.clear();
+    for (const Pose& pose : scene_.world_from_camera) {
+      sequence.frames.emplace_back().world_from_camera = pose;
+    }
+    return sequence;
   }
 
   Budget Summary() const {

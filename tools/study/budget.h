@@ -48,7 +48,8 @@ struct Budget {
 
 // Renders, reconstructs and evaluates every variant with two models of light: the paper's (one source at the
 // camera as strong as all, no light from wall to wall) and that of options.train with the light as it is.
-// Where the automatic gain is off, the gain is the geometric mean of those that it chose with all effects on.
+// Frames that training takes are rendered, once for all variants that show the same; what is surveyed follows
+// from the poses of all. The scene's gain must be automatic (SetBudgetExposure).
 Budget MeasureBudget(const Scene& scene, const std::vector<BudgetEffect>& effects,
                      const BudgetOptions& options);
 

@@ -3,14 +3,10 @@
 #include "sim/cost/knobs.h"
 
 namespace lumen {
-namespace {
 
-// A colour that varies over the wall and a gain a frame are in the paper's model (eq. 3).
 bool InPapersModel(const std::string& effect) {
   return effect == "mottling" || effect == "vessels" || effect == "auto_gain";
 }
-
-}  // namespace
 
 std::string NameOf(Level level) { return level == Level::kIdeal ? "ideal" : "full"; }
 

@@ -15,6 +15,10 @@ enum class Level {
 // "ideal" or "full".
 std::string NameOf(Level level);
 
+// Of the scene's effects those that the paper's model has (eq. 3): a colour that varies over the wall and a
+// gain a frame.
+bool InPapersModel(const std::string& effect);
+
 // kIdeal: one light at the camera, as strong as all the scene's, no light from wall to wall, no coat, none of
 // the lens's, the sensor's and the wall's movements' effects. What stays is what the paper's model has:
 // texture, and the automatic gain, which is recorded, so that it is known.
