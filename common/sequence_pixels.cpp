@@ -11,6 +11,14 @@ namespace {
 // Mask values from here on are image.
 constexpr uint8_t kMaskThreshold = 128;
 
+// row: as many as the image is wide.
+void MarkValidOfRow(const Calibration& calibration, const Camera<double>& camera, int y, uint8_t* row) {
+  for (int x = 0; x < calibration.camera.width; ++x) {
+    const bool masked_out = !calibration.mask.empty() && *calibration.mask.Pixel(x, y) < kMaskThreshold;
+    row[x] = !masked_out && camera.Unproject(Vec2d(x, y)) ? 255 : 0;
+  }
+}
+
 }  // namespace
 
 Image8 ReadColor(const Sequence& sequence, const SequenceFrame& frame) {
@@ -66,18 +74,15 @@ Image8 ValidPixels(const Calibration& calibration) {
   Image8 valid(calibration.camera.width, calibration.camera.height, 1);
   ParallelFor(0, valid.height, [&](int64_t row) {
     const int y = static_cast<int>(row);
-    std::ranges::copy(ValidPixelsOfRow(calibration, camera, y), valid.Pixel(0, y));
+    MarkValidOfRow(calibration, camera, y, valid.Pixel(0, y));
   });
   return valid;
 }
 
 std::vector<uint8_t> ValidPixelsOfRow(const Calibration& calibration, const Camera<double>& camera, int y) {
-  std::vector<uint8_t> valid(calibration.camera.width, 0);
-  for (int x = 0; x < calibration.camera.width; ++x) {
-    const bool masked_out = !calibration.mask.empty() && *calibration.mask.Pixel(x, y) < kMaskThreshold;
-    if (!masked_out && camera.Unproject(Vec2d(x, y))) valid[x] = 255;
-  }
-  return valid;
+  std::vector<uint8_t> row(static_cast<size_t>(calibration.camera.width));
+  MarkValidOfRow(calibration, camera, y, row.data());
+  return row;
 }
 
 }  // namespace lumen
