@@ -47,8 +47,8 @@ Irradiance<T> IrradianceAt(const Vec3<T>& position, const Vec3<T>& direction, T 
   return {toward, std::exp(-spread * (1 - cos_angle)) / squared};
 }
 
-// The same pattern as directions to send light in: the integral of exp(−spread·(1 − cos)) over the sphere, sr
-// …
+// The same pattern as directions to send light in: the integral of exp(−spread·(1 − cos)) over the sphere,
+// sr.
 inline double PatternSolidAngle(double spread) {
   return 2 * kPi * (spread > 0 ? -std::expm1(-2 * spread) / spread : 2.0);
 }

@@ -143,13 +143,14 @@ class Renderer {
     NoteSeen(frame, *wall);
     if (scene_.truth.exact.empty()) film = {};
     // Compressing keeps one thread busy; it can be done beside the next frame.
-    writing_.Start([this, frame, wall, picture = std::move(picture), film = std::move(film),
-                    truth = std::move(truth)] {
-      WriteImage(FrameFile(options_.folder, frame, "color.png"), picture);
-      if (scene_.truth.c3vd) WriteC3vd(frame, *truth);
-      if (!scene_.truth.exact.empty()) WriteExact(frame, film, *truth);
-      if (Wants("mesh")) WriteMesh(options_.folder / "exact" / ExactName(frame, "_mesh.ply"), wall->mesh());
-    });
+    writing_.Start(
+        [this, frame, wall, picture = std::move(picture), film = std::move(film), truth = std::move(truth)] {
+          WriteImage(FrameFile(options_.folder, frame, "color.png"), picture);
+          if (scene_.truth.c3vd) WriteC3vd(frame, *truth);
+          if (!scene_.truth.exact.empty()) WriteExact(frame, film, *truth);
+          if (Wants("mesh"))
+            WriteMesh(options_.folder / "exact" / ExactName(frame, "_mesh.ply"), wall->mesh());
+        });
   }
 
   FrameTruth TruthOf(int frame, const WallMoment& wall) {

@@ -238,8 +238,8 @@ TEST(Vessels, AreAFunctionOfSeedAndPlace) {
   EXPECT_LT(in_both, in_one / 5);
 }
 
-// Growth decides by comparing; what a mesh's rounding changes must not be among it. (No distance that is looked
-// for is a multiple of this tube's regular steps.)
+// Growth decides by comparing; what a mesh's rounding changes must not be among it. (No distance that is
+// looked for is a multiple of this tube's regular steps.)
 TEST(Vessels, GrowAlikeOnAWallThatIsRoundedOtherwise) {
   const VesselOptions options{5.7, 0.5, Vec3d::Ones()};
   Mesh rounded = Wall();

@@ -56,8 +56,8 @@ class GlintPaths {
   }
 
  private:
-  // The pixels that look for each that the coat sends on all light of; least time to a given noise, of 3,
-  // 4, 6 and 12.
+  // The pixels that look for each that the coat sends on all light of; least time to a given noise, of 1, 3,
+  // 6 and 12.
   static constexpr float kPathsOfWeight = 6;
 
   const BouncePaths<true>& paths_;

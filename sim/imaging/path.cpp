@@ -211,7 +211,7 @@ class Tracer {
   void TraceIndirect(const TilePixels& pixels, uint64_t key, int sample, PathCount* count) {
     TileSample<kCoat> tile;
     std::optional<GlintPaths> glints;
-    if constexpr (kCoat) glints.emplace(mirrored_paths_, kGlintPairs, tile.mirrored);
+    if constexpr (kCoat) glints.emplace(mirrored_paths_, kGlintPairs, walks_ ? tile.mirrored : tile.indirect);
     for (int block = 0; block < kBlocks; ++block) {
       tile.places[block].alive = LanesI{};
       tile.indirect[block] = Lanes3{};
@@ -257,18 +257,17 @@ class Tracer {
   }
 
   // Adds a block's sample of indirect light to the frame's sums, but for pixels where it is not finite.
-  // mirrored: what the coat of the pixels' places sends of it, where there is one.
+  // mirrored: if it is kept apart.
   void Deposit(const TilePixels& pixels, int block, int sample, const Lanes3& light, const Lanes3& mirrored,
                PathCount* count) {
     for (int i = 0; i < kLanes; ++i) {
       if (!pixels.on[block][i]) continue;
       const int x = pixels.X(block, i), y = pixels.Y(block, i);
       const size_t pixel = static_cast<size_t>(y) * view_.valid->width + x;
-      const Vec3f value = light[i], apart = kCoat ? mirrored[i] : Vec3f(0, 0, 0);
+      const Vec3f value = light[i], apart = mirrored_.empty() ? Vec3f(0, 0, 0) : mirrored[i];
       if (value.allFinite() && apart.allFinite()) {
-        std::vector<double>& other = mirrored_.empty() ? indirect_ : mirrored_;
         for (int c = 0; c < 3; ++c) indirect_[3 * pixel + c] += value[c];
-        for (int c = 0; c < 3 && kCoat; ++c) other[3 * pixel + c] += apart[c];
+        for (int c = 0; c < 3 && !mirrored_.empty(); ++c) mirrored_[3 * pixel + c] += apart[c];
         continue;
       }
       Note({1, x, y, sample}, &count->failure);

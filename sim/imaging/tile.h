@@ -21,7 +21,7 @@ template <bool kCoat>
 struct TileSample {
   PlacesOf<kCoat> places[kBlocks];  // that the pixels see
   Lanes3 indirect[kBlocks];
-  Lanes3 mirrored[kBlocks];  // indirect light off the coat of the places, apart from the rest
+  Lanes3 mirrored[kBlocks];  // indirect light off the coat, apart from the rest where there is tissue
 };
 
 // Where a tile lies. The tile may reach beyond the image.
