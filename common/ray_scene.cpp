@@ -78,9 +78,7 @@ void Trace(RTCScene scene, const int* valid, RTCRay16* rays) {
 
 #endif
 
-void ThrowOnDeviceError(RTCDevice device, const std::string& doing) {
-  const RTCError error = rtcGetDeviceError(device);
-  if (error == RTC_ERROR_NONE) return;
+[[noreturn]] void Throw(RTCError error, const std::string& doing) {
   const std::string what =
       error == RTC_ERROR_OUT_OF_MEMORY ? "not enough memory" : "error " + std::to_string(error);
   throw std::runtime_error("Embree: " + what + " while " + doing);
@@ -92,7 +90,7 @@ RTCDevice SharedDevice() {
   static const RTCDevice device = [] {
     // Paths look all over the tree of boxes: with large pages they take 2 to 3% less time.
     const RTCDevice created = rtcNewDevice("hugepages=1");
-    if (!created) ThrowOnDeviceError(nullptr, "opening a device");
+    if (!created) Throw(rtcGetDeviceError(nullptr), "opening a device");
     return created;
   }();
   return device;
@@ -172,9 +170,10 @@ struct RayScene::State {
     rtcSetSceneFlags(scene, RTC_SCENE_FLAG_ROBUST);
     if (!mesh.faces.empty()) Attach(device);
     rtcCommitScene(scene);
-    const RTCError error = rtcGetDeviceError(device);
-    if (error != RTC_ERROR_NONE) rtcReleaseScene(scene);
-    ThrowOnDeviceError(device, "building a scene of " + std::to_string(mesh.faces.size()) + " faces");
+    const RTCError error = rtcGetDeviceError(device);  // is told once
+    if (error == RTC_ERROR_NONE) return;
+    rtcReleaseScene(scene);
+    Throw(error, "building a scene of " + std::to_string(mesh.faces.size()) + " faces");
   }
   ~State() { rtcReleaseScene(scene); }
   State(const State&) = delete;
