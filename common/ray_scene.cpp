@@ -106,7 +106,14 @@ void CheckFaces(const Mesh& mesh) {
   }
 }
 
-RTCRay SingleRay(const Vec3f& origin, const Vec3f& direction, float tnear, float tfar) {
+// 0 for a triangle without area.
+Vec3f UnitNormal(const Vec3d& a, const Vec3d& b, const Vec3d& c) {
+  const Vec3d normal = (b - a).cross(c - a);
+  const double length = normal.norm();
+  return length > 0 ? (normal / length).cast<float>() : Vec3f(Vec3f::Zero());
+}
+
+RTCRay SingleRay(const Vec3f& origin, const Vec3f& direction, float tnear, float tfar, float time) {
   RTCRay ray{};
   ray.org_x = origin.x();
   ray.org_y = origin.y();
@@ -116,6 +123,7 @@ RTCRay SingleRay(const Vec3f& origin, const Vec3f& direction, float tnear, float
   ray.dir_z = direction.z();
   ray.tnear = tnear;
   ray.tfar = tfar;
+  ray.time = time;
   ray.mask = ~0u;  // 0 would meet nothing
   return ray;
 }
@@ -130,7 +138,7 @@ void FillRays(const RayPacket& rays, RTCRay16* out, int valid[RayPacket::kSize])
   std::copy_n(rays.direction[2], kSize, out->dir_z);
   std::copy_n(rays.tnear, kSize, out->tnear);
   std::copy_n(rays.tfar, kSize, out->tfar);
-  std::fill_n(out->time, kSize, 0.0f);
+  std::fill_n(out->time, kSize, rays.time);
   std::fill_n(out->mask, kSize, ~0u);
   std::fill_n(out->id, kSize, 0u);
   std::fill_n(out->flags, kSize, 0u);
@@ -140,15 +148,16 @@ void FillRays(const RayPacket& rays, RTCRay16* out, int valid[RayPacket::kSize])
 }  // namespace
 
 struct RayScene::State {
-  const Mesh* mesh;
+  std::span<const Mesh> steps;
   Vec3d anchor;
   std::vector<Vec3f> face_normals;
   RTCScene scene;
-  // Embree's own copies: three numbers a vertex and a face; null for a mesh without faces.
-  const float* vertices = nullptr;
+  // Embree's own copies: three numbers a vertex, of each step, and a face; none for a mesh without faces.
+  std::vector<const float*> vertices;
   const int32_t* corners = nullptr;
 
-  explicit State(const Mesh& mesh) : mesh(&mesh), anchor(Vec3d::Zero()) {
+  explicit State(std::span<const Mesh> steps) : steps(steps), anchor(Vec3d::Zero()) {
+    const Mesh& mesh = steps.front();
     CheckFaces(mesh);
     if (!mesh.vertices.empty()) {
       Eigen::AlignedBox3d box;
@@ -157,10 +166,8 @@ struct RayScene::State {
     }
     face_normals.reserve(mesh.faces.size());
     for (const Vec3i& face : mesh.faces) {
-      const Vec3d& a = mesh.vertices[face[0]];
-      const Vec3d normal = (mesh.vertices[face[1]] - a).cross(mesh.vertices[face[2]] - a);
-      const double length = normal.norm();
-      face_normals.push_back(length > 0 ? (normal / length).cast<float>() : Vec3f(Vec3f::Zero()));
+      face_normals.push_back(
+          UnitNormal(mesh.vertices[face[0]], mesh.vertices[face[1]], mesh.vertices[face[2]]));
     }
     const RTCDevice device = SharedDevice();
     scene = rtcNewScene(device);
@@ -181,36 +188,60 @@ struct RayScene::State {
 
   void Attach(RTCDevice device) {
     const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
-    auto* to_vertices = static_cast<float*>(rtcSetNewGeometryBuffer(
-        geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), mesh->vertices.size()));
+    rtcSetGeometryTimeStepCount(geometry, static_cast<unsigned>(steps.size()));
+    const std::vector<Vec3i>& faces = steps.front().faces;
     auto* indices = static_cast<uint32_t*>(rtcSetNewGeometryBuffer(
-        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), mesh->faces.size()));
-    if (to_vertices && indices) {
-      vertices = to_vertices;
+        geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3, 3 * sizeof(uint32_t), faces.size()));
+    bool has_memory = indices != nullptr;
+    for (size_t step = 0; has_memory && step < steps.size(); ++step) has_memory = AddVertices(geometry, step);
+    if (has_memory) {
       corners = reinterpret_cast<const int32_t*>(indices);
-      for (const Vec3d& vertex : mesh->vertices) {
-        const Vec3f local = (vertex - anchor).cast<float>();
-        to_vertices = std::copy_n(local.data(), 3, to_vertices);
-      }
-      for (const Vec3i& face : mesh->faces) indices = std::copy_n(face.data(), 3, indices);
+      for (const Vec3i& face : faces) indices = std::copy_n(face.data(), 3, indices);
       rtcCommitGeometry(geometry);
       rtcAttachGeometry(scene, geometry);
     }
     rtcReleaseGeometry(geometry);
   }
+
+  std::array<Vec3d, 3> Corners(uint32_t face, const Moment& moment) const {
+    const Vec3i& corners = steps.front().faces[face];
+    const std::vector<Vec3d>& from = steps[moment.step].vertices;
+    std::array<Vec3d, 3> places = {from[corners[0]], from[corners[1]], from[corners[2]]};
+    if (steps.size() == 1) return places;
+    const std::vector<Vec3d>& to = steps[moment.step + 1].vertices;
+    for (int i = 0; i < 3; ++i) places[i] += double(moment.part) * (to[corners[i]] - places[i]);
+    return places;
+  }
+
+  bool AddVertices(RTCGeometry geometry, size_t step) {
+    const std::vector<Vec3d>& from = steps[step].vertices;
+    auto* to = static_cast<float*>(rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_VERTEX,
+                                                           static_cast<unsigned>(step), RTC_FORMAT_FLOAT3,
+                                                           3 * sizeof(float), from.size()));
+    if (!to) return false;
+    vertices.push_back(to);
+    for (const Vec3d& vertex : from) {
+      const Vec3f local = (vertex - anchor).cast<float>();
+      to = std::copy_n(local.data(), 3, to);
+    }
+    return true;
+  }
 };
 
-RayScene::RayScene(const Mesh& mesh) : state_(std::make_unique<State>(mesh)) {}
+RayScene::RayScene(const Mesh& mesh) : RayScene(std::span(&mesh, 1)) {}
+RayScene::RayScene(std::span<const Mesh> steps) : state_(std::make_unique<State>(steps)) {}
 RayScene::~RayScene() = default;
 RayScene::RayScene(RayScene&&) noexcept = default;
 RayScene& RayScene::operator=(RayScene&&) noexcept = default;
 
-const Mesh& RayScene::mesh() const { return *state_->mesh; }
+const Mesh& RayScene::mesh() const { return state_->steps.front(); }
+bool RayScene::moves() const { return state_->steps.size() > 1; }
 const Vec3d& RayScene::anchor() const { return state_->anchor; }
 
-RayHit RayScene::Intersect(const Vec3f& origin, const Vec3f& direction, float tnear, float tfar) const {
+RayHit RayScene::Intersect(const Vec3f& origin, const Vec3f& direction, float tnear, float tfar,
+                           float time) const {
   RTCRayHit query;
-  query.ray = SingleRay(origin, direction, tnear, tfar);
+  query.ray = SingleRay(origin, direction, tnear, tfar, time);
   query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   query.hit.primID = kNoFace;
   query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
@@ -219,8 +250,9 @@ RayHit RayScene::Intersect(const Vec3f& origin, const Vec3f& direction, float tn
   return {query.hit.primID, query.ray.tfar, query.hit.u, query.hit.v};
 }
 
-bool RayScene::Occluded(const Vec3f& origin, const Vec3f& direction, float tnear, float tfar) const {
-  RTCRay ray = SingleRay(origin, direction, tnear, tfar);
+bool RayScene::Occluded(const Vec3f& origin, const Vec3f& direction, float tnear, float tfar,
+                        float time) const {
+  RTCRay ray = SingleRay(origin, direction, tnear, tfar, time);
   Trace(state_->scene, &ray);
   return ray.tfar == -std::numeric_limits<float>::infinity();
 }
@@ -250,26 +282,59 @@ LanesI RayScene::Occluded(const RayPacket& rays) const {
   return Load(query.tfar) == -std::numeric_limits<float>::infinity();
 }
 
-Lanes3 RayScene::Points(const HitPacket& hits) const {
+Lanes3 RayScene::Points(const HitPacket& hits, float time) const {
   const LanesI face = LoadI(hits.face) * 3;
   const LanesI met = LoadI(hits.face) != static_cast<int32_t>(kNoFace);
-  const float* const vertices = state_->vertices;
-  if (!vertices) return Lanes3{};
-  const auto corner = [&](int i) {
-    const LanesI vertex = Gather(state_->corners, met ? face + i : LanesI{}) * 3;
-    return Lanes3{Gather(vertices, vertex), Gather(vertices, vertex + 1), Gather(vertices, vertex + 2)};
+  if (state_->vertices.empty()) return Lanes3{};
+  const auto point = [&](const float* vertices) {
+    const auto corner = [&](int i) {
+      const LanesI vertex = Gather(state_->corners, met ? face + i : LanesI{}) * 3;
+      return Lanes3{Gather(vertices, vertex), Gather(vertices, vertex + 1), Gather(vertices, vertex + 2)};
+    };
+    const Lanes3 a = corner(0);
+    return a + (corner(1) - a) * Load(hits.u) + (corner(2) - a) * Load(hits.v);
   };
-  const Lanes3 a = corner(0);
-  return a + (corner(1) - a) * Load(hits.u) + (corner(2) - a) * Load(hits.v);
+  if (!moves()) return point(state_->vertices.front());
+  const auto [step, part] = MomentOf(time);
+  const Lanes3 from = point(state_->vertices[step]), to = point(state_->vertices[step + 1]);
+  return from + (to - from) * Broadcast(part);
 }
 
 const std::vector<Vec3f>& RayScene::face_normals() const { return state_->face_normals; }
 
+Lanes3 RayScene::Normals(const HitPacket& hits, float time) const {
+  if (!moves()) {
+    const float* const normals = state_->face_normals.front().data();
+    const LanesI first = LoadI(hits.face) * 3;
+    return {Gather(normals, first), Gather(normals, first + 1), Gather(normals, first + 2)};
+  }
+  Lanes3 normals;
+  const Moment moment = MomentOf(time);
+  for (int i = 0; i < kLanes; ++i) {
+    const auto [a, b, c] = state_->Corners(hits.face[i], moment);
+    normals.Set(i, UnitNormal(a, b, c));
+  }
+  return normals;
+}
+
+RayScene::Moment RayScene::MomentOf(float time) const {
+  if (!moves()) return {0, 0};
+  // As Embree does; what time 1 belongs to is the end of the last stretch.
+  const size_t stretches = state_->steps.size() - 1;
+  const float along = time * static_cast<float>(stretches);
+  const size_t step = std::min(static_cast<size_t>(along), stretches - 1);
+  return {step, along - static_cast<float>(step)};
+}
+
+std::array<Vec3d, 3> RayScene::Corners(uint32_t face, float time) const {
+  return state_->Corners(face, MomentOf(time));
+}
+
 double RayScene::ExactDistance(uint32_t face, const Vec3d& origin, const Vec3d& direction) const {
-  const Vec3i& corners = state_->mesh->faces[face];
+  const Vec3i& corners = mesh().faces[face];
   Vec3d from_origin[3], along;
   for (int i = 0; i < 3; ++i) {
-    from_origin[i] = state_->mesh->vertices[corners[i]] - origin;
+    from_origin[i] = mesh().vertices[corners[i]] - origin;
     along[i] = from_origin[i].dot(direction) / direction.squaredNorm();
   }
   const Vec3d normal = (from_origin[1] - from_origin[0]).cross(from_origin[2] - from_origin[0]);
