@@ -28,6 +28,24 @@ std::shared_ptr<const WallMoment> MovingWall::At(int frame) {
   return kept_.front().wall;
 }
 
+double MovingWall::StretchesOver(double frames) const {
+  return moves() ? peristaltic_->StretchesOver(frames) : 0;
+}
+
+std::unique_ptr<const WallMotion> MovingWall::During(int frame, double frames) const {
+  const int stretches = static_cast<int>(StretchesOver(frames));
+  if (stretches == 0) return nullptr;
+  std::vector<Mesh> steps(static_cast<size_t>(stretches) + 1);
+  for (int i = 0; i <= stretches; ++i) {
+    steps[i] = peristaltic_->At(frame + frames * (double(i) / stretches - 0.5));
+  }
+  auto motion = std::make_unique<WallMotion>(std::move(steps));
+  for (size_t i = 0; vertex_normals_ && i < motion->steps.size(); ++i) {
+    motion->vertex_normals.push_back(VertexNormals(motion->steps[i]));
+  }
+  return motion;
+}
+
 std::shared_ptr<const WallMoment> MovingWall::Build(int frame) const {
   const auto wall = moves()
                         ? std::make_shared<WallMoment>(std::make_unique<const Mesh>(peristaltic_->At(frame)))

@@ -167,6 +167,12 @@ Vec3d PeristalticWave::Moved(const Vec3d& place, const Foot& foot, double frame)
   return place - peristalsis_.amplitude * wave * wave * foot.yields * (place - foot.point);
 }
 
+double PeristalticWave::OffChord_mm(double yielding_mm, double frames) const {
+  const double turn =
+      kPi * peristalsis_.speed_mm_s * frames / peristalsis_.rate_hz / peristalsis_.wavelength_mm;
+  return peristalsis_.amplitude * yielding_mm * turn * turn / 4;
+}
+
 PeristalticWall::PeristalticWall(const Peristalsis& peristalsis, const Geometry& geometry)
     : rest_(geometry.mesh), wave_(peristalsis, geometry), feet_(rest_.vertices.size()) {
   ParallelFor(0, static_cast<int64_t>(feet_.size()),
@@ -179,6 +185,15 @@ Mesh PeristalticWall::At(double frame) const {
     mesh.vertices[i] = wave_.Moved(rest_.vertices[i], feet_[i], frame);
   }
   return mesh;
+}
+
+double PeristalticWall::StretchesOver(double frames) const {
+  double yielding_mm = 0;
+  for (size_t i = 0; i < feet_.size(); ++i) {
+    yielding_mm = std::max(yielding_mm, feet_[i].yields * (rest_.vertices[i] - feet_[i].point).norm());
+  }
+  // The distance from the chord falls with the square of the number of stretches.
+  return std::ceil(std::sqrt(wave_.OffChord_mm(yielding_mm, frames) / kOffTheWay_mm));
 }
 
 }  // namespace lumen
