@@ -42,6 +42,21 @@ TEST(Shutter, RowsAndSamplesHaveTheirTimes) {
   EXPECT_DOUBLE_EQ(motion.Time(0.5, 0), -0.2);
 }
 
+// The extremes are met exactly, and rounding leads beyond neither.
+TEST(Shutter, PartsOfTheDuration) {
+  const Shutter shutter = {0.4, -0.8};
+  EXPECT_DOUBLE_EQ(shutter.Duration(), 1.2);
+  EXPECT_FLOAT_EQ(CameraMotion(shutter, {Pose::Identity()}, 0).Part(0.3), 0.75f);
+  for (int i = 1; i <= 300; ++i) {
+    const double exposure = i / 300.0, readout = std::sin(7.0 * i);
+    const CameraMotion motion({exposure, readout}, {Pose::Identity()}, 0);
+    EXPECT_EQ(motion.Part(motion.Time(readout < 0, 0)), 0) << i;
+    const float last = motion.Part(motion.Time(readout > 0, std::nextafter(1.0, 0.0)));
+    EXPECT_LE(last, 1) << i;
+    EXPECT_GT(last, 1 - 1e-6f) << i;
+  }
+}
+
 // A plate x > 0 at a distance of 20 mm, seen by a camera that moves along x and sees 1 mm as 5 px.
 struct Stage {
   Mesh mesh;

@@ -119,9 +119,9 @@ class BouncePaths {
   FarEnds<kCoat> End(const Eye& eye, const BounceStart& start, BouncePairs pairs, int64_t* rays) const {
     FarEnds<kCoat> ends;
     HitPacket hits;
-    ends.places = Meet(start.on, start.origin, start.direction, &hits, rays);
+    ends.places = Meet(eye.time, start.on, start.origin, start.direction, &hits, rays);
     if constexpr (!kCoat) {
-      if (walks_) ends.entries = Entries(hits, ends.places, 1, start, rays);
+      if (walks_) ends.entries = Entries(eye.time, hits, ends.places, 1, start, rays);
     }
     const PlacesOf<kCoat>& lit = Lit(ends);
     const ChosenLight light = LightFromOneGuide<kCoat>(wall_, eye, lit, guide_lobes_,
@@ -147,9 +147,10 @@ class BouncePaths {
         if (bounce == 2) ends->from_walls.toward = direction;
       }
       HitPacket hits;
-      places = Meet(places.alive, OffsetOrigin(places.point, places.normal), direction, &hits, rays);
+      places =
+          Meet(eye.time, places.alive, OffsetOrigin(places.point, places.normal), direction, &hits, rays);
       if constexpr (!kCoat) {
-        if (walks_) places = Entries(hits, places, bounce, start, rays);
+        if (walks_) places = Entries(eye.time, hits, places, bounce, start, rays);
       }
       const ChosenLight light = LightFromOneGuide<kCoat>(
           wall_, eye, places, guide_lobes_, Numbers(start, places.alive, pairs.Guide(bounce)), rays);
@@ -163,16 +164,17 @@ class BouncePaths {
   }
 
   // The places that rays from the wall come to.
-  PlacesOf<kCoat> Meet(const LanesI& on, const Lanes3& origin, const Lanes3& direction, HitPacket* hits,
-                       int64_t* rays) const {
+  PlacesOf<kCoat> Meet(float time, const LanesI& on, const Lanes3& origin, const Lanes3& direction,
+                       HitPacket* hits, int64_t* rays) const {
     constexpr float kFar = 1e30f;
     RayPacket packet;
     Store3(origin, packet.origin);
     Store3(direction, packet.direction);
+    packet.time = time;
     for (int i = 0; i < kLanes; ++i) {
       RayHit hit;
       if (on[i]) {
-        hit = wall_.Intersect(origin[i], direction[i], 0, kFar);
+        hit = wall_.Intersect(origin[i], direction[i], 0, kFar, time);
         ++*rays;
       }
       hits->face[i] = hit.face;
@@ -231,10 +233,10 @@ class BouncePaths {
     return ends.places;
   }
 
-  Places Entries(const HitPacket& hits, const Places& places, int bounce, const BounceStart& start,
-                 int64_t* rays) const {
+  Places Entries(float time, const HitPacket& hits, const Places& places, int bounce,
+                 const BounceStart& start, int64_t* rays) const {
     return walks_->Entries(
-        hits, places, bounce, [&](int i) { return *start.samplers[i]; }, rays);
+        time, hits, places, bounce, [&](int i) { return *start.samplers[i]; }, rays);
   }
 
   static Lanes Numbers(const BounceStart& start, const LanesI& alive, uint32_t pair) {

@@ -1,4 +1,5 @@
-// The endoscope at a moment, in the wall's local coordinates: where the camera is, and its light guides.
+// The endoscope at a moment, in the wall's local coordinates: where the camera is, and its light guides. What
+// is asked of the wall with it is asked of the same moment.
 #pragma once
 
 #include <vector>
@@ -17,9 +18,10 @@ struct Guide {
 };
 
 struct Eye {
-  // pinhole: all of the camera's rays start at its centre.
-  Eye(const RayScene& wall, const Light& light, const Pose& world_from_camera, bool pinhole)
-      : origin(wall.ToLocal(world_from_camera.translation())),
+  // pinhole: all of the camera's rays start at its centre. time: of a wall that moves.
+  Eye(const RayScene& wall, const Light& light, const Pose& world_from_camera, bool pinhole, float time = 0)
+      : time(time),
+        origin(wall.ToLocal(world_from_camera.translation())),
         rotation(world_from_camera.linear().cast<float>()) {
     for (const LightSource& source : light.sources) {
       guides.push_back({wall.ToLocal(world_from_camera * source.position),
@@ -29,6 +31,7 @@ struct Eye {
     }
   }
 
+  float time;
   Vec3f origin;
   Mat3<float> rotation;
   std::vector<Guide> guides;

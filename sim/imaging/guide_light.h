@@ -71,8 +71,10 @@ Lanes3 Reflected(const Guide& guide, const Incidence& incidence, const PlacesOf<
   return Reflected<kCoat>(guide, incidence, places).Whole();
 }
 
-// −1 in those of the asked lanes from whose place a guide can't be seen. For places close together.
-inline LanesI Shadowed(const RayScene& wall, const Guide& guide, const Places& places, const LanesI& asked) {
+// −1 in those of the asked lanes from whose place a guide can't be seen. For places close together. time: of
+// a wall that moves.
+inline LanesI Shadowed(const RayScene& wall, const Guide& guide, float time, const Places& places,
+                       const LanesI& asked) {
   if (!Any(asked)) return LanesI{};
   const Lanes3 from = OffsetOrigin(places.point, places.normal);
   RayPacket rays;
@@ -80,6 +82,7 @@ inline LanesI Shadowed(const RayScene& wall, const Guide& guide, const Places& p
   Store3(Broadcast(guide.position) - from, rays.direction);
   Store(Lanes{}, rays.tnear);
   Store(asked ? Broadcast(1) : Broadcast(-1), rays.tfar);
+  rays.time = time;
   return wall.Occluded(rays);
 }
 
@@ -125,7 +128,7 @@ ChosenLight LightFromOneGuide(const RayScene& wall, const Eye& eye, const Places
     if (!(chosen_sum[i] > 0)) continue;
     ++*rays;
     const Vec3f origin = from[i];
-    if (wall.Occluded(origin, position[i] - origin, 0, 1)) share[i] = 0;
+    if (wall.Occluded(origin, position[i] - origin, 0, 1, eye.time)) share[i] = 0;
   }
   const LanesI finite = IsFinite(sum);
   light.sent = Select(finite, light.sent * share, {sum, sum, sum});

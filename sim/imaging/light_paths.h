@@ -209,6 +209,7 @@ class LightPaths {
     Store3(Broadcast(beam.guide->position), rays.origin);
     Store(Lanes{}, rays.tnear);
     Store(Broadcast(1e30f), rays.tfar);
+    rays.time = eye_.time;
     for (int i = 0; i < kLanes; ++i) {
       const double along = (cell / beam.columns * 4 + i / 4 + double(u[i])) / (4.0 * beam.rows);
       const double around = (cell % beam.columns * 4 + i % 4 + double(v[i])) / (4.0 * beam.columns);
@@ -234,7 +235,8 @@ class LightPaths {
     BounceStart& start = waiting->start;
     for (int bounce = 1; Any(start.on); ++bounce) {
       HitPacket hits;
-      const CoatedPlaces places = paths_.Meet(start.on, start.origin, start.direction, &hits, &chunk->rays);
+      const CoatedPlaces places =
+          paths_.Meet(eye_.time, start.on, start.origin, start.direction, &hits, &chunk->rays);
       start.on = places.alive;
       AddSplats(places, start, chunk);
       if (bounce == options_.bounces) break;
@@ -296,7 +298,7 @@ class LightPaths {
       if (!*view_.valid->Pixel(x, y)) continue;
       ++chunk->rays;
       const Vec3f origin = from[i];
-      if (scene_.wall->Occluded(origin, eye_.origin - origin, 0, 1)) continue;
+      if (scene_.wall->Occluded(origin, eye_.origin - origin, 0, 1, eye_.time)) continue;
       chunk->splats.push_back({x, y, light[i] * view_.camera->AreaPerSteradian(*pixel, in_camera)});
     }
   }

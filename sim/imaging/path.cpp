@@ -187,17 +187,17 @@ class Tracer {
     if (kCoat || !walks_) AddDirect(eye, places, true, light, count);
     if (!walks_) return;
     LobesOf<kCoat> scattered{};
-    AddDirect(eye, Entries(hits, places, packet, count), false, &scattered, count);
+    AddDirect(eye, Entries(eye.time, hits, places, packet, count), false, &scattered, count);
     light->base = scattered.base;
   }
 
   // Where what is seen of tissue came in.
-  PlacesOf<kCoat> Entries(const HitPacket& hits, const PlacesOf<kCoat>& places, const PixelSamples& packet,
-                          PathCount* count) const {
+  PlacesOf<kCoat> Entries(float time, const HitPacket& hits, const PlacesOf<kCoat>& places,
+                          const PixelSamples& packet, PathCount* count) const {
     const auto sampler = [&](int i) {
       return Sampler(seed_, packet.key[i], packet.sample[i], options_.sampler);
     };
-    return walks_->Entries(hits, places, 0, sampler, &count->rays);
+    return walks_->Entries(time, hits, places, 0, sampler, &count->rays);
   }
 
   static void Accumulate(const Lanes3& light, double (*sums)[kLanes]) {
@@ -212,26 +212,30 @@ class Tracer {
     TileSample<kCoat> tile;
     std::optional<GlintPaths> glints;
     if constexpr (kCoat) glints.emplace(mirrored_paths_, kGlintPairs, walks_ ? tile.mirrored : tile.indirect);
+    // Places are joined as they are at one moment. Where only the camera moves they are the same at all, and
+    // each block is seen at a moment of its own.
+    std::optional<Eye> moved;
+    if (view_.motion) moved.emplace(EyeAt(pixels.y0 + kTileEdge / 2, key, sample));
+    const Eye& tile_eye = moved ? *moved : eye_;
     for (int block = 0; block < kBlocks; ++block) {
       tile.places[block].alive = LanesI{};
       tile.indirect[block] = Lanes3{};
       if constexpr (kCoat) tile.mirrored[block] = Lanes3{};
       if (!Any(pixels.on[block])) continue;
-      if (view_.motion) {
+      if (view_.motion && !scene_.wall->moves()) {
         const Eye eye = EyeOf(pixels, block, sample);
         TraceIndirectBlock(eye, pixels, block, sample, &tile, &glints, count);
         if (glints) glints->Trace(eye, &count->rays);  // what moves has another eye in the next block
       } else {
-        TraceIndirectBlock(eye_, pixels, block, sample, &tile, &glints, count);
+        TraceIndirectBlock(tile_eye, pixels, block, sample, &tile, &glints, count);
       }
     }
-    if (glints) glints->Trace(eye_, &count->rays);
+    if (glints) glints->Trace(tile_eye, &count->rays);
     if (options_.shared_paths > 0) {
       const auto lost = [&](const auto& path) {
         Note({1, pixels.X(path.block, path.lane), pixels.Y(path.block, path.lane), sample}, &count->failure);
       };
-      shared_paths_.Add(view_.motion ? EyeAt(pixels.y0 + kTileEdge / 2, key, sample) : eye_, seed_, key,
-                        sample, &tile, &count->rays, lost);
+      shared_paths_.Add(tile_eye, seed_, key, sample, &tile, &count->rays, lost);
     }
     for (int block = 0; block < kBlocks; ++block) {
       Deposit(pixels, block, sample, tile.indirect[block], tile.mirrored[block], count);
@@ -252,7 +256,7 @@ class Tracer {
       };
       (*glints)->Start(eye, block, tile->places[block], sampler, &count->rays);
     }
-    if (walks_) tile->places[block] = Entries(hits, tile->places[block], packet, count);
+    if (walks_) tile->places[block] = Entries(eye.time, hits, tile->places[block], packet, count);
     if (options_.shared_paths == 0) AddOwnPaths(eye, packet, block, tile, count);
   }
 
@@ -319,7 +323,10 @@ class Tracer {
     const double height = std::clamp(row / view_.valid->height, 0.0, 1.0);
     const double random =
         Sampler(seed_, key, static_cast<uint32_t>(sample), options_.sampler).Pair(kTimePair)[0];
-    return Eye(*scene_.wall, *view_.light, view_.motion->At(view_.motion->Time(height, random)), pinhole_);
+    const CameraMotion& motion = *view_.motion;
+    const double time = motion.Time(height, random);
+    return Eye(*scene_.wall, *view_.light, motion.At(time), pinhole_,
+               scene_.wall->moves() ? motion.Part(time) : 0);
   }
   Eye EyeOf(const TilePixels& pixels, int block, int sample) const {
     return EyeAt(pixels.Y(block, 0) + kBlockEdge / 2, PixelKey(pixels.X(block, 0), pixels.Y(block, 0)),
@@ -356,6 +363,7 @@ class Tracer {
     Store3(Rotated(eye.rotation, in_camera), rays.direction);
     Store(Lanes{}, rays.tnear);
     Store(seen ? Broadcast(kFar) : Broadcast(-1), rays.tfar);
+    rays.time = eye.time;
     scene_.wall->Intersect(rays, hits);
     count->rays += Count(seen);
     return finder_.Find(rays, *hits, false);
@@ -386,7 +394,7 @@ class Tracer {
       LobesOf<kCoat> light = Reflected<kCoat>(guide, IncidenceFrom(guide, places.point), places);
       if (!(guide.at_camera && seen)) {
         const LanesI asked = Sum(light.Whole()) != 0.0f;
-        const LanesI shadowed = Shadowed(*scene_.wall, guide, places, asked);
+        const LanesI shadowed = Shadowed(*scene_.wall, guide, eye.time, places, asked);
         count->rays += Count(asked);
         light.base = Select(shadowed, Lanes3{}, light.base);
         if constexpr (kCoat) light.glint = Select(shadowed, Lanes3{}, light.glint);

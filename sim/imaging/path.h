@@ -26,12 +26,15 @@ struct PathOptions {
   int direct_oversampling = 1;  // samples of direct light for each of light between walls: they cost less
 };
 
-// What there is to see. All of it is referred to.
+// What there is to see. All of it is referred to. A wall that moves takes a View with motion, and its times
+// 0…1 are the frame's duration.
 struct PathScene {
   const RayScene* wall;
   const Surface* surface;
   uint64_t surface_seed;
-  const std::vector<Vec3d>* vertex_normals = nullptr;  // VertexNormals of the wall, for a surface with a coat
+  // VertexNormals of the wall, for a surface with a coat; for a wall that moves, an array of them: each
+  // step's.
+  const std::vector<Vec3d>* vertex_normals = nullptr;
   const Mesh* rest = nullptr;         // the wall at rest, which carries the texture; none: the wall itself
   Vec3d rest_anchor = Vec3d::Zero();  // RayScene::anchor of the wall at rest
 };

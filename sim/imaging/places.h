@@ -39,7 +39,8 @@ class PlaceFinder {
  public:
   explicit PlaceFinder(const PathScene& scene) : scene_(scene) {}
 
-  // Directions: unit. bounced: the rays come from the wall, not from the camera.
+  // Directions: unit; the rays' time is that of the hits. bounced: they come from the wall, not from the
+  // camera.
   PlacesOf<kCoat> Find(const RayPacket& rays, const HitPacket& hits, bool bounced) const {
     PlacesOf<kCoat> places;
     places.alive = LoadI(hits.face) != static_cast<int32_t>(kNoFace);
@@ -60,15 +61,13 @@ class PlaceFinder {
       }
     }
     const Lanes3 direction = Load3(rays.direction);
-    places.point = scene_.wall->Points(known);
-    const float* const normals = scene_.wall->face_normals().front().data();
-    const LanesI first = LoadI(known.face) * 3;
-    const Lanes3 normal = {Gather(normals, first), Gather(normals, first + 1), Gather(normals, first + 2)};
+    places.point = scene_.wall->Points(known, rays.time);
+    const Lanes3 normal = scene_.wall->Normals(known, rays.time);
     const LanesI turned = Dot(normal, direction) > 0.0f;
     places.normal = Select(turned, normal * Broadcast(-1), normal);
     const Lanes3 resting = scene_.rest ? RestingPoints(known) : places.point;
     places.albedo = AlbedoAt(*scene_.surface, scene_.surface_seed, resting);
-    if constexpr (kCoat) SetCoat(known, direction, resting, bounced, &places);
+    if constexpr (kCoat) SetCoat(known, rays.time, direction, resting, bounced, &places);
     return places;
   }
 
@@ -88,19 +87,14 @@ class PlaceFinder {
 
   // The coat lies on the smooth wall that the triangles stand for: its lobe is narrower than the angles
   // between them.
-  void SetCoat(const HitPacket& hits, const Lanes3& direction, const Lanes3& resting, bool bounced,
-               CoatedPlaces* places) const {
+  void SetCoat(const HitPacket& hits, float time, const Lanes3& direction, const Lanes3& resting,
+               bool bounced, CoatedPlaces* places) const {
     const Surface& surface = *scene_.surface;
     places->coat = bounced && surface.bounced_coat ? &*surface.bounced_coat : &*surface.coat;
-    const std::vector<Vec3d>& normals = *scene_.vertex_normals;
-    const std::vector<Vec3i>& faces = scene_.wall->mesh().faces;
-    Lanes3 smooth;
-    for (int i = 0; i < kLanes; ++i) {
-      const Vec3i& corners = faces[hits.face[i]];
-      const double u = hits.u[i], v = hits.v[i];
-      const Vec3d mean =
-          (1 - u - v) * normals[corners[0]] + u * normals[corners[1]] + v * normals[corners[2]];
-      smooth.Set(i, mean.cast<float>());
+    const auto [step, part] = scene_.wall->MomentOf(time);
+    Lanes3 smooth = MeanNormals(hits, scene_.vertex_normals[step]);
+    if (scene_.wall->moves()) {
+      smooth = smooth + (MeanNormals(hits, scene_.vertex_normals[step + 1]) - smooth) * Broadcast(part);
     }
     const Lanes squared = Dot(smooth, smooth);
     smooth = Select(squared > 0.0f, smooth * (1.0f / Sqrt(squared)), places->normal);
@@ -108,6 +102,20 @@ class PlaceFinder {
     places->outgoing = direction * Broadcast(-1);
     places->coat_normal = places->coat->ReliefNormal(scene_.surface_seed, resting, smooth);
     places->reflectance = places->coat->Reflectance(Dot(places->coat_normal, places->outgoing));
+  }
+
+  // Of the corners; not unit.
+  Lanes3 MeanNormals(const HitPacket& hits, const std::vector<Vec3d>& normals) const {
+    const std::vector<Vec3i>& faces = scene_.wall->mesh().faces;
+    Lanes3 means;
+    for (int i = 0; i < kLanes; ++i) {
+      const Vec3i& corners = faces[hits.face[i]];
+      const double u = hits.u[i], v = hits.v[i];
+      const Vec3d mean =
+          (1 - u - v) * normals[corners[0]] + u * normals[corners[1]] + v * normals[corners[2]];
+      means.Set(i, mean.cast<float>());
+    }
+    return means;
   }
 
   const PathScene scene_;

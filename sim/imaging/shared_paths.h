@@ -37,8 +37,9 @@ class SharedPaths {
     int block, lane;  // that it started from
   };
 
-  // Adds to the indirect light of a sample. key: of the tile's random numbers; sample: of the frame. lost is
-  // called with a Lost for each path that isn't finite.
+  // Adds to the indirect light of a sample. On a wall that moves the tile's places must be of the eye's time.
+  // key: of the tile's random numbers; sample: of the frame. lost is called with a Lost for each path that
+  // isn't finite.
   template <class OnLost>
   void Add(const Eye& eye, uint64_t seed, uint64_t key, int sample, TileSample<kCoat>* tile, int64_t* rays,
            const OnLost& lost) const {
@@ -76,7 +77,7 @@ class SharedPaths {
         passed += chance;
         if (std::floor(passed) == before) continue;
         const double share = places.count / (double(packets) * kLanes * chance);
-        Join(path.ends, i, path.source[i], static_cast<float>(share), places, tile, rays);
+        Join(eye.time, path.ends, i, path.source[i], static_cast<float>(share), places, tile, rays);
       }
     }
   }
@@ -198,7 +199,7 @@ class SharedPaths {
     return start;
   }
 
-  void Join(const FarEnds<kCoat>& ends, int lane, int source, float share, const Places& places,
+  void Join(float time, const FarEnds<kCoat>& ends, int lane, int source, float share, const Places& places,
             TileSample<kCoat>* tile, int64_t* rays) const {
     const Lanes3 point = Broadcast(ends.places.point[lane]), normal = Broadcast(ends.places.normal[lane]);
     const Lanes3 from = OffsetOrigin(point, normal);
@@ -208,7 +209,7 @@ class SharedPaths {
       coupling[block] = Coupling(seen, point, normal);
       const LanesI faces = coupling[block] > 0.0f;
       if (!Any(faces)) continue;
-      LanesI visible = ~Hidden(from, places.origin[block], faces, rays);
+      LanesI visible = ~Hidden(time, from, places.origin[block], faces, rays);
       // The path itself has shown that its start is seen.
       if (source / kLanes == block) visible[source % kLanes] = -1;
       coupling[block] = visible ? coupling[block] : Lanes{};
@@ -258,12 +259,13 @@ class SharedPaths {
     tile->indirect[block] = tile->indirect[block] + Select(joined, light, Lanes3{});
   }
 
-  LanesI Hidden(const Lanes3& from, const Lanes3& to, const LanesI& asked, int64_t* rays) const {
+  LanesI Hidden(float time, const Lanes3& from, const Lanes3& to, const LanesI& asked, int64_t* rays) const {
     RayPacket packet;
     Store3(from, packet.origin);
     Store3(to - from, packet.direction);
     Store(Lanes{}, packet.tnear);
     Store(asked ? Broadcast(1) : Broadcast(-1), packet.tfar);
+    packet.time = time;
     *rays += Count(asked);
     return wall_.Occluded(packet);
   }

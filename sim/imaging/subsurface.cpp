@@ -35,11 +35,9 @@ struct Place {
   Vec3f point, normal;  // normal by the right-hand rule
 };
 
-Place PlaceOf(const RayScene& wall, const RayHit& hit) {
-  const Mesh& mesh = wall.mesh();
-  const Vec3i& corners = mesh.faces[hit.face];
-  const Vec3d a = mesh.vertices[corners[0]];
-  const Vec3d ab = mesh.vertices[corners[1]] - a, ac = mesh.vertices[corners[2]] - a;
+Place PlaceOf(const RayScene& wall, const RayHit& hit, float time) {
+  const auto [a, b, c] = wall.Corners(hit.face, time);
+  const Vec3d ab = b - a, ac = c - a;
   return {(a - wall.anchor() + double(hit.u) * ab + double(hit.v) * ac).cast<float>(),
           ab.cross(ac).normalized().cast<float>()};
 }
@@ -47,21 +45,23 @@ Place PlaceOf(const RayScene& wall, const RayHit& hit) {
 // The wall, asked from inside the tissue.
 struct Inside {
   const RayScene& wall;
+  float time;
   float turn;  // ±1: what turns the faces' normals to the lumen
 
-  Inside(const RayScene& scene, const WalkEntry& entry)
-      : wall(scene),
-        turn(FaceNormal(scene.mesh(), int(entry.face)).dot(entry.normal.cast<double>()) < 0 ? -1 : 1) {}
+  Inside(const RayScene& scene, const WalkEntry& entry) : wall(scene), time(entry.time) {
+    const auto [a, b, c] = wall.Corners(entry.face, time);
+    turn = (b - a).cross(c - a).dot(entry.normal.cast<double>()) < 0 ? -1 : 1;
+  }
 
   // Where a ray leaves the tissue. What it meets from the lumen's side is passed: rounding had put the ray's
   // origin, a place on the wall or beside it, before the wall.
   RayHit Leave(const Vec3f& origin, const Vec3f& direction, float tfar, Place* place, int64_t* rays) const {
     float tnear = 0;
     while (true) {
-      const RayHit hit = wall.Intersect(origin, direction, tnear, tfar);
+      const RayHit hit = wall.Intersect(origin, direction, tnear, tfar, time);
       ++*rays;
       if (!hit.hit()) return hit;
-      *place = PlaceOf(wall, hit);
+      *place = PlaceOf(wall, hit, time);
       place->normal *= turn;
       if (place->normal.dot(direction) > 0) return hit;
       // Beyond what rounds where distances are compared, or the ray would meet the same face for ever.

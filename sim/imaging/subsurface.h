@@ -65,6 +65,7 @@ struct WalkEntry {
   Vec3f point;      // on the face
   Vec3f normal;     // of the face, to the lumen's side
   Vec3f direction;  // into the tissue, unit
+  float time = 0;   // of a wall that moves
 };
 
 struct WalkExit {

@@ -34,11 +34,12 @@ class TissueWalks {
 
   // Where light comes in that leaves the places, alive where there is such light. As albedo they have what
   // of it leaves there, RGB: what the walk carries, dimmed by the texture at both of its ends. The coat's
-  // reflectance stays that of the places. sampler(i): lane i's; rays are counted.
+  // reflectance stays that of the places. time: of a wall that moves; sampler(i): lane i's; rays are counted.
   template <class Samplers>
-  PlacesOf<kCoat> Entries(const HitPacket& hits, const PlacesOf<kCoat>& places, int bounce,
+  PlacesOf<kCoat> Entries(float time, const HitPacket& hits, const PlacesOf<kCoat>& places, int bounce,
                           const Samplers& sampler, int64_t* rays) const {
     RayPacket onto{};
+    onto.time = time;
     HitPacket ends{};
     Lanes3 weight{};
     for (int i = 0; i < kLanes; ++i) {
@@ -46,10 +47,10 @@ class TissueWalks {
       if (!places.alive[i]) continue;
       const Vec3f normal = places.normal[i];
       const Sampler random = sampler(i);
-      const WalkExit exit = tissue_.Walk(
-          wall_,
-          {hits.face[i], places.point[i], normal, lambert::Sample(-normal, random.Pair(WalkPair(bounce)))},
-          Stream(random.Pair(WalkPair(bounce) + 1)), rays);
+      const WalkExit exit = tissue_.Walk(wall_,
+                                         {hits.face[i], places.point[i], normal,
+                                          lambert::Sample(-normal, random.Pair(WalkPair(bounce))), time},
+                                         Stream(random.Pair(WalkPair(bounce) + 1)), rays);
       if (!exit.found) continue;
       ends.face[i] = exit.hit.face;
       ends.u[i] = exit.hit.u;
