@@ -124,12 +124,19 @@ class Renderer {
     View view = {&fast_camera_, &valid_, scene_.world_from_camera[frame], &scene_.calibration.light};
     if (scene_.defocus) view.defocus = &*scene_.defocus;
     std::optional<CameraMotion> motion;
+    PathScene path_scene = PathSceneOf(*wall);
+    std::unique_ptr<const WallMotion> wall_motion;
     if (scene_.sensor.shutter) {
       view.motion = &motion.emplace(*scene_.sensor.shutter, scene_.world_from_camera, frame);
+      wall_motion = walls_.During(frame, scene_.sensor.shutter->Duration());
+    }
+    if (wall_motion) {
+      path_scene.wall = &wall_motion->rays;
+      path_scene.vertex_normals = wall_motion->vertex_normals.data();
     }
     Film film;
     const PathCount count =
-        RenderFrame(PathSceneOf(*wall), view, scene_.path, options_.seed, frame, WantsParts(), &film);
+        RenderFrame(path_scene, view, scene_.path, options_.seed, frame, WantsParts(), &film);
     // Without a coat there is no glint, without tissue nothing comes from below the surface.
     for (const auto& [part, image] : {std::pair("glint", &film.glint), {"subsurface", &film.subsurface}}) {
       if (Wants(part) && image->empty()) *image = ImageF(valid_.width, valid_.height, 3);

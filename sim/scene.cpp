@@ -1,6 +1,8 @@
 #include "sim/scene.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdio>
 
 #include "common/calibration.h"
 #include "common/config.h"
@@ -107,17 +109,59 @@ std::vector<std::string> NameEffects(const Scene& scene) {
 }
 
 // A guide in the wall would light it from within.
-bool LightBehindWall(const Light& light, const Pose& world_from_camera, const RayScene& wall) {
+bool LightBehindWall(const Light& light, const Pose& world_from_camera, const RayScene& wall,
+                     float time = 0) {
   const Vec3f from = wall.ToLocal(world_from_camera.translation());
   return std::any_of(light.sources.begin(), light.sources.end(), [&](const LightSource& source) {
     return !source.position.isZero(0) &&
-           wall.Occluded(from, wall.ToLocal(world_from_camera * source.position) - from, 0, 1);
+           wall.Occluded(from, wall.ToLocal(world_from_camera * source.position) - from, 0, 1, time);
   });
+}
+
+// A wall that moves while a frame is taken is asked at the steps between which it goes straight on, as the
+// camera does but for its turn at the frame's moment.
+void CheckWhileTaken(const Scene& scene, const MovingWall& walls, int frame,
+                     const std::filesystem::path& file) {
+  const double duration = scene.sensor.shutter->Duration();
+  const auto motion = walls.During(frame, duration);
+  if (!motion) return;
+  const CameraMotion camera(*scene.sensor.shutter, scene.world_from_camera, frame);
+  const double last = static_cast<double>(motion->steps.size() - 1);
+  for (size_t step = 0; step < motion->steps.size(); ++step) {
+    const double part = static_cast<double>(step) / last;
+    const Pose pose = camera.At(duration * (part - 0.5));
+    if (!Clearance(motion->steps[step]).Encloses(pose.translation())) {
+      RefuseFrame(
+          file, frame,
+          "while it is taken the contracted wall passes the camera; keep it nearer to the centreline, "
+          "lower peristalsis.amplitude or shorten sensor.shutter.exposure");
+    }
+    if (LightBehindWall(scene.calibration.light, pose, motion->rays, static_cast<float>(part))) {
+      RefuseFrame(
+          file, frame,
+          "while it is taken a light source lies behind the wall; keep the camera farther from it "
+          "(trajectory.clearance_mm), lower peristalsis.amplitude or shorten sensor.shutter.exposure");
+    }
+  }
+}
+
+void CheckStretches(const Scene& scene, const MovingWall& walls, const std::filesystem::path& file) {
+  const double frames = scene.sensor.shutter->Duration();
+  if (walls.StretchesOver(frames) <= MovingWall::kMostStretches) return;
+  const double way_mm = std::abs(scene.peristalsis->speed_mm_s) * frames / scene.peristalsis->rate_hz;
+  char number[32];
+  std::snprintf(number, sizeof(number), "%.4g", way_mm);
+  throw InputError(file.string() + ": peristalsis: its rings travel " + number +
+                   " mm while a frame is taken, too far to be followed in " +
+                   std::to_string(MovingWall::kMostStretches) +
+                   " steps; lower peristalsis.speed_mm_s or sensor.shutter.exposure and readout, or raise "
+                   "peristalsis.rate_hz");
 }
 
 // The trajectory has been found clear of the wall at rest.
 void CheckEndoscopeInLumen(const Scene& scene, const std::filesystem::path& file) {
   MovingWall walls(scene.geometry, {scene.peristalsis});
+  if (scene.sensor.shutter) CheckStretches(scene, walls, file);
   for (size_t frame = 0; frame < scene.world_from_camera.size(); ++frame) {
     const Pose& pose = scene.world_from_camera[frame];
     const auto wall = walls.At(static_cast<int>(frame));
@@ -132,6 +176,7 @@ void CheckEndoscopeInLumen(const Scene& scene, const std::filesystem::path& file
                               "(trajectory.clearance_mm)") +
                       (walls.moves() ? " or lower peristalsis.amplitude" : ""));
     }
+    if (scene.sensor.shutter) CheckWhileTaken(scene, walls, static_cast<int>(frame), file);
   }
 }
 

@@ -69,6 +69,17 @@ TEST_F(EffectsTest, ShutterChangesThePictureOnly) {
   EXPECT_EQ(Differing(without, RenderTo("instant", {exact, "sensor.shutter.exposure=0"})), Names{});
 }
 
+// So it is where the wall moves within the exposure as well.
+TEST_F(EffectsTest, WallMotionChangesThePictureOnly) {
+  const std::string exact = "truth.exact=[\"albedo\", \"z\", \"normal\", \"flow\", \"mesh\"]",
+                    rings = "peristalsis.amplitude=0.2", rate = "peristalsis.rate_hz=4";
+  const fs::path without = RenderTo("without", {exact, rings, rate});
+  EXPECT_EQ(Differing(without, RenderTo("with", {exact, rings, rate, "sensor.shutter.exposure=0.9"})),
+            Names{"0001_color.png"});
+  EXPECT_EQ(Differing(without, RenderTo("instant", {exact, rings, rate, "sensor.shutter.exposure=0"})),
+            Names{});
+}
+
 // The gains are those of a sharp picture.
 TEST_F(EffectsTest, DefocusChangesThePictureOnly) {
   const std::string exact = "truth.exact=[\"albedo\", \"z\", \"normal\", \"position\", \"flow\"]";

@@ -232,7 +232,9 @@ TEST_F(NotFinite, IsCountedAndReplayed) {
   CreateFolder(scratch_ / "it's a scene");
   WriteFile(scratch_ / "it's a scene" / "s.toml", scene);
   const std::string lumen = LUMEN_COMMAND;
-  for (const std::string metered : {"", " --set sensor.gain=2"}) {
+  for (const std::string metered :
+       {"", " --set sensor.gain=2",
+        " --set sensor.gain=2 --set sensor.shutter.readout=0.3 --set peristalsis.amplitude=0.1"}) {
     std::string text = scene;
     if (!metered.empty()) text.erase(text.find("[sensor.auto_gain]"), 18);
     WriteFile(scratch_ / "it's a scene" / "s.toml", text);

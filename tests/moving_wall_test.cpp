@@ -349,5 +349,34 @@ TEST_F(MovingWallRender, RefusesAFrameThatTheWallPasses) {
   EXPECT_NE(camera.find("frame "), std::string::npos) << camera;
 }
 
+// A ring a wavelength on in each frame: at the frames' moments the camera is clear of them all, in between it
+// isn't.
+TEST_F(MovingWallRender, RefusesAFrameThatTheWallPassesWhileItIsTaken) {
+  const auto settings = [](const std::string& phase, const std::string& exposure) {
+    return std::vector<std::string>{"peristalsis.amplitude=0.9", "peristalsis.speed_mm_s=50",
+                                    "peristalsis.rate_hz=1", "peristalsis.phase_rad=" + phase,
+                                    "sensor.shutter.exposure=" + exposure};
+  };
+  EXPECT_EQ(ErrorOf([&] { Read(settings("-0.7", "0.1")); }), "");
+  const std::string light = ErrorOf([&] { Read(settings("-0.7", "1")); });
+  EXPECT_NE(light.find("frame 0: while it is taken a light source lies behind the wall"), std::string::npos)
+      << "said: " << light;
+  std::vector<std::string> aside = settings("-0.7", "1");
+  aside.insert(aside.end(), {"trajectory.wobble_mm=30", "light.source.0.position=[0, 0, 0]"});
+  const std::string camera = ErrorOf([&] { Read(aside); });
+  EXPECT_NE(camera.find("while it is taken the contracted wall passes the camera"), std::string::npos)
+      << "said: " << camera;
+}
+
+TEST_F(MovingWallRender, RefusesRingsThatAreTooFastForTheShutter) {
+  const std::vector<std::string> fast = {"peristalsis.speed_mm_s=1000", "peristalsis.rate_hz=2"};
+  EXPECT_EQ(ErrorOf([&] { Read(fast); }), "");
+  std::vector<std::string> taken = fast;
+  taken.push_back("sensor.shutter.exposure=0.5");
+  const std::string said = ErrorOf([&] { Read(taken); });
+  EXPECT_NE(said.find("scene.toml: peristalsis: its rings travel 250 mm"), std::string::npos) << said;
+  EXPECT_NE(said.find("lower peristalsis.speed_mm_s"), std::string::npos) << said;
+}
+
 }  // namespace
 }  // namespace lumen

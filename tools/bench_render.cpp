@@ -52,14 +52,12 @@ Settings operator+(Settings a, const Settings& b) {
 struct Subject {
   Scene scene;
   MovingWall walls;
-  std::shared_ptr<const WallMoment> wall;
   FrameSetup setup;
 
   explicit Subject(Scene from)
       : scene(std::move(from)),
         walls(scene.geometry, {scene.peristalsis, scene.surface.coat.has_value()}),
-        wall(walls.At(0)),
-        setup(scene, *wall, 0, 0) {}
+        setup(scene, &walls, 0, 0) {}
 };
 
 // guides: how many off the axis; 0 = one source at the camera.
@@ -85,7 +83,7 @@ double CpuSecondsOfFrame(const Subject& subject, const PathOptions& options, int
 
 RayRates EmbreeAlone(const Arguments& arguments) {
   const Subject subject(SceneWith(arguments, {}, 0));
-  const RayRates rates = MeasureRays(subject.scene, subject.wall->rays, arguments.runs);
+  const RayRates rates = MeasureRays(subject.scene, subject.setup.wall(), arguments.runs);
   fmt::print("\nEmbree alone, one core, {} triangles\n", subject.scene.geometry.mesh.faces.size());
   const auto line = [](const char* name, double rate) {
     fmt::print("  {:<40}{:>8.2f} Mrays/CPU-s\n", name, rate);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <optional>
 
 #include "sim/geometry/moving_wall.h"
@@ -14,19 +15,21 @@ namespace lumen {
 
 class FrameSetup {
  public:
-  // Scene and wall are referred to; the wall has vertex normals if the scene has a coat.
-  FrameSetup(const Scene& scene, const WallMoment& wall, int frame, uint64_t seed);
+  // The scene is referred to, and the geometry of the walls, which have vertex normals if the scene has a
+  // coat.
+  FrameSetup(const Scene& scene, MovingWall* walls, int frame, uint64_t seed);
   FrameSetup(const FrameSetup&) = delete;
   FrameSetup& operator=(const FrameSetup&) = delete;
 
   const Image8& valid() const { return valid_; }
+  const RayScene& wall() const { return wall_->rays; }  // at the frame's moment
 
   // The path tracer alone: linear radiance.
   ImageF Trace(const PathOptions& options, uint64_t seed, PathCount* count = nullptr) const;
   // The plain path tracer, in float or double.
   template <class T>
   ImageF TracePlainly(const PathOptions& options, uint64_t seed) const {
-    return RenderReference<T>(path_scene_, ViewOfFrame(), options, seed, frame_);
+    return RenderReference<T>(at_moment_, ViewOfFrame(), options, seed, frame_);
   }
   // The scene's own path, lens and sensor, with the automatic gain's metering.
   Image8 Take(uint64_t seed) const;
@@ -36,7 +39,9 @@ class FrameSetup {
 
   const Scene& scene_;
   int frame_;
-  PathScene path_scene_;
+  std::shared_ptr<const WallMoment> wall_;
+  std::unique_ptr<const WallMotion> wall_motion_;
+  PathScene at_moment_, during_exposure_;
   Camera<float> camera_;
   Image8 valid_;
   Photographer photographer_;

@@ -26,8 +26,7 @@ class CostMeasurement {
       : scene_(scene),
         options_(options),
         walls_(scene.geometry, {scene.peristalsis, scene.surface.coat.has_value()}),
-        wall_(walls_.At(options.frame)),
-        setup_(scene, *wall_, options.frame, options.seed),
+        setup_(scene, &walls_, options.frame, options.seed),
         progress_("cost"),
         start_(WallSeconds()) {}
 
@@ -121,7 +120,7 @@ class CostMeasurement {
     for (const EffectSwitch& effect : SwitchesOf(scene_)) {
       Scene without = scene_;
       effect.switch_off(&without);
-      const FrameSetup setup(without, *wall_, options_.frame, options_.seed);
+      const FrameSetup setup(without, &walls_, options_.frame, options_.seed);
       const auto start = WallSeconds();
       std::vector<double> on, off;
       // Short frames are taken oftener: their clock is coarser.
@@ -144,11 +143,15 @@ class CostMeasurement {
     if (walls_.moves()) MeasureMovingWall();
   }
 
-  // A wall that moves is built anew for every frame.
+  // A wall that moves is built anew for every frame, and again as it moves while the frame is taken. That
+  // rays at it then cost more is the shutter's.
   void MeasureMovingWall() {
     std::vector<double> seconds;
     for (int run = 0; run < options_.runs; ++run) {
-      seconds.push_back(CpuSecondsOf([&] { walls_.At(options_.frame + 1 + run); }));
+      seconds.push_back(CpuSecondsOf([&] {
+        walls_.At(options_.frame + 1 + run);
+        if (scene_.sensor.shutter) walls_.During(options_.frame, scene_.sensor.shutter->Duration());
+      }));
     }
     result_.effects.push_back({"peristalsis", MedianOf(seconds), MedianError(seconds)});
     result_.frame_seconds += MedianOf(seconds);
@@ -178,7 +181,6 @@ class CostMeasurement {
   const Scene& scene_;
   const RenderCostOptions& options_;
   MovingWall walls_;
-  std::shared_ptr<const WallMoment> wall_;
   FrameSetup setup_;
   Progress progress_;
   double start_;
