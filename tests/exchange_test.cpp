@@ -12,6 +12,7 @@
 #include "common/pose_file.h"
 #include "common/progress.h"
 #include "common/random.h"
+#include "sim/render.h"
 #include "tests/support.h"
 #include "tools/exchange/export_sequence.h"
 #include "tools/exchange/import_model.h"
@@ -391,6 +392,112 @@ TEST_F(Export, C3vdComesBackFromColmapToTheFitsError) {
       }
     }
     EXPECT_NEAR(largest, result.fit->max_px, 1e-9);
+  }
+}
+
+// With the sequence that was exported as the calibration its camera and its poses come back, not the
+// fisheye's.
+TEST_F(Export, C3vdComesBackWholeWithItsCalibration) {
+  const Sequence sequence = Winding(scratch_ / "in", C3vdOf(135, 108));
+  const ExportResult result = Write(sequence, ExportFormat::kColmap);
+  EXPECT_GT(std::abs(result.fit->roll_rad), 1e-3);
+  ImportOptions options;
+  options.model = scratch_ / "out/sparse/0";
+  options.images = scratch_ / "out/images";
+  options.calibration = scratch_ / "in";
+  EXPECT_EQ(ImportModel(options, scratch_ / "back").turned_back_rad, result.fit->roll_rad);
+  const Sequence back = ReadSequence(scratch_ / "back");
+  const CameraIntrinsics &a = sequence.calibration.camera, &b = back.calibration.camera;
+  EXPECT_EQ(b.model, CameraModel::kScaramuzza);
+  EXPECT_EQ(a.a, b.a);
+  EXPECT_EQ(a.stretch, b.stretch);
+  EXPECT_EQ(Vec2d(a.cx, a.cy), Vec2d(b.cx, b.cy));
+  EXPECT_EQ(sequence.calibration.mask.data, back.calibration.mask.data);
+  ASSERT_EQ(back.frames.size(), sequence.frames.size());
+  const auto largest_difference = [&](const Sequence& other) {
+    double largest = 0;
+    for (size_t i = 0; i < sequence.frames.size(); ++i) {
+      const auto difference =
+          sequence.frames[i].world_from_camera.matrix() - other.frames[i].world_from_camera.matrix();
+      largest = std::max(largest, difference.cwiseAbs().maxCoeff());
+    }
+    return largest;
+  };
+  EXPECT_LT(largest_difference(back), 1e-9);
+
+  // A camera that has been refined since stays the model's own.
+  std::string cameras = ReadFile(options.model / "cameras.txt");
+  cameras.insert(cameras.find_last_of('.') + 1, "1");
+  WriteFile(options.model / "cameras.txt", cameras);
+  EXPECT_FALSE(ImportModel(options, scratch_ / "refined").turned_back_rad);
+  EXPECT_GT(largest_difference(ReadSequence(scratch_ / "refined")), 1e-3);
+}
+
+// COLMAP's points as its documentation has them: a track's images have an observation of the point at the
+// place that the track names, the model projects the point to them within the error that is written, and they
+// see no other wall there: the frames' depth files, ray-traced, say how far it is.
+constexpr char kPointsReader[] = R"(
+import math, sys
+def lines(name): return open(sys.argv[1] + '/' + name).read().split('\n')
+rows = [l for l in lines('images.txt') if not l.startswith('#')]
+seen = {}
+for head, body in zip(rows[::2], rows[1::2]):
+    words = body.split()
+    seen[int(head.split()[0])] = [(float(x), float(y), int(p)) for x, y, p in zip(*[iter(words)] * 3)]
+points, tracked = 0, 0
+for line in lines('points3D.txt'):
+    if not line or line.startswith('#'): continue
+    words = line.split()
+    assert all(0 <= int(c) <= 255 for c in words[4:7])
+    assert float(words[7]) < 0.06
+    track = [(int(a), int(b)) for a, b in zip(*[iter(words[8:])] * 2)]
+    assert len(track) >= 2 and len(set(a for a, b in track)) == len(track)
+    for image, place in track: assert seen[image][place][2] == int(words[0])
+    points += 1
+    tracked += len(track)
+assert tracked == sum(map(len, seen.values()))
+print(points, tracked)
+)";
+
+TEST_F(Export, PointsAreTheWallsAndSeenWhereTheySay) {
+  const Scene scene = ReadScene(LUMEN_SOURCE_FOLDER "/scenes/colon.toml",
+                                {"camera.width=135", "camera.height=108", "camera.mask=octagon",
+                                 "trajectory.frames=4", "path.samples=1", "geometry.tolerance_mm=0.3"},
+                                0);
+  RenderOptions render;
+  render.folder = scratch_ / "in";
+  Render(scene, render);
+  const Sequence sequence = ReadSequence(render.folder);
+  ExportOptions options;
+  options.points = 3000;
+  for (const bool rectify : {false, true}) {
+    fs::remove_all(scratch_ / "out");
+    options.rectify = rectify;
+    const ExportResult result = ExportSequence(sequence, options, scratch_ / "out");
+    EXPECT_GT(result.points, 500);
+    WriteFile(scratch_ / "points.py", kPointsReader);
+    EXPECT_EQ(OutputOf("/usr/bin/python3 '" + (scratch_ / "points.py").string() + "' '" +
+                       (scratch_ / "out/sparse/0").string() + "'"),
+              std::to_string(result.points) + " " + std::to_string(result.observations) + "\n");
+
+    const ColmapModel model = ReadColmapModel(scratch_ / "out/sparse/0");
+    const Camera<double> camera(FromColmap(model.cameras[0])), own(sequence.calibration.camera);
+    int64_t compared = 0, off = 0;
+    for (size_t i = 0; i < model.images.size(); ++i) {
+      const ImageF depth = DecodeDepth(ReadImage16(sequence.frames[i].depth, 1));
+      for (const ColmapObservation& observation : model.images[i].observations) {
+        const ColmapPoint& point = model.points.at(observation.point);
+        const Vec3d local = model.images[i].camera_from_world * point.position;
+        EXPECT_LT((camera.Project(local).value() - observation.pixel).norm(), rectify ? 1e-3 : 0.1);
+        const Vec2d at = own.Project(sequence.frames[i].world_from_camera.inverse() * point.position).value();
+        const float z = *depth.Pixel(int(std::lround(at.x())), int(std::lround(at.y())));
+        ++compared;
+        off += !(std::abs(z - local.z()) < 0.05 * local.z());
+      }
+    }
+    EXPECT_EQ(compared, result.observations);
+    // Half a pixel off, on a wall seen from the side or over a fold's edge.
+    EXPECT_LT(off, 0.05 * double(compared)) << off << " of " << compared;
   }
 }
 

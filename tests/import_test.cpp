@@ -88,7 +88,9 @@ class ColmapModelFiles : public testing::Test {
     EXPECT_EQ(model.images[1].camera_from_world.matrix().topLeftCorner(3, 3), Mat3d::Identity());
     EXPECT_TRUE(model.images[1].observations.empty());
     ASSERT_EQ(model.points.size(), 2u);
-    EXPECT_EQ(model.points.at(11), Vec3d(-1.5, 0.25, 1e3));
+    EXPECT_EQ(model.points.at(11).position, Vec3d(-1.5, 0.25, 1e3));
+    EXPECT_EQ(model.points.at(9).color, (Rgb8{255, 0, 128}));
+    EXPECT_EQ(model.points.at(9).error_px, 0.5);
   }
   // The error of reading, from the model's folder on.
   std::string Error() const {
@@ -372,7 +374,7 @@ TEST(ScaleFromLight, OfARenderedColon) {
   const Camera<double> camera(sequence.calibration.camera);
   constexpr double kUnit_mm = 7;
   std::vector<ColmapImage> images;
-  std::unordered_map<uint64_t, Vec3d> points;
+  std::unordered_map<uint64_t, ColmapPoint> points;
   for (const SequenceFrame& frame : sequence.frames) {
     Sequence alone = sequence;
     alone.frames = {frame};
@@ -381,7 +383,7 @@ TEST(ScaleFromLight, OfARenderedColon) {
     image.camera_from_world = frame.world_from_camera.inverse();
     for (size_t v = 0; v < seen.size(); v += 7) {
       if (!seen[v]) continue;
-      points[v] = wall.vertices[v] / kUnit_mm;
+      points[v].position = wall.vertices[v] / kUnit_mm;
       image.observations.push_back({*camera.Project(image.camera_from_world * wall.vertices[v]), v});
     }
     image.camera_from_world.translation() /= kUnit_mm;

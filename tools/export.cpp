@@ -46,6 +46,11 @@ nlohmann::json Run(const Arguments& arguments) {
     }
     fmt::print("\n");
   }
+  if (result.points > 0) {
+    json["points"] = {{"count", result.points}, {"observations", result.observations}};
+    fmt::print("points   {}, seen {:.1f} times each\n", result.points,
+               static_cast<double>(result.observations) / result.points);
+  }
   if (result.sphere_radius_mm > 0) {
     json["sphere_radius_mm"] = result.sphere_radius_mm;
     fmt::print("sphere   the unit sphere is {:.1f} mm\n", result.sphere_radius_mm);
@@ -73,6 +78,11 @@ void AddExport(CLI::App* app) {
   command->add_option("--fov-deg", options.fov_deg, "what a pinhole sees across the image")
       ->capture_default_str();
   command->add_option("--max-fit-px", options.max_fit_px, "an OpenCV fisheye that is off by more is refused")
+      ->capture_default_str();
+  command
+      ->add_option("--points", options.points,
+                   "colmap: places on the true wall, of which those that two frames see are written")
+      ->check(CLI::Range(0, 10'000'000))
       ->capture_default_str();
   command->add_flag("--link", options.link, "symbolic links in place of copies of the images");
 }

@@ -18,6 +18,11 @@ nlohmann::json Run(const Arguments& arguments) {
   const ImportResult result = ImportModel(arguments.options, arguments.folder);
   nlohmann::json json = {{"frames", result.frames}, {"mm_per_unit", result.mm_per_unit}};
   fmt::print("frames   {}\n", result.frames);
+  if (result.turned_back_rad) {
+    json["turned_back_rad"] = *result.turned_back_rad;
+    fmt::print("camera   the calibration's own, for which the model's stands; poses turned back by {:.3f}°\n",
+               *result.turned_back_rad * 180 / kPi);
+  }
   fmt::print("scale    {:.6g} mm a unit of the model\n", result.mm_per_unit);
   if (result.from_poses) {
     const SimilarityFit& fit = *result.from_poses;
@@ -55,8 +60,10 @@ void AddImport(CLI::App* app) {
       ->required();
   command->add_option("--images", options.images, "folder of the model's images")->required();
   command->add_option("-o,--output", arguments->folder, "the sequence's folder, empty or new")->required();
-  command->add_option("--calibration", options.calibration,
-                      "a sequence with the light, response, gains and mask (default: C3VD's, gains unknown)");
+  command->add_option(
+      "--calibration", options.calibration,
+      "a sequence with the light, response, gains and mask, and the camera where the model is an "
+      "export of it (default: C3VD's, gains unknown)");
   auto* scale = command->add_option_group("scale", "millimetres of a unit of the model (default: 1)");
   scale->add_option("--scale", options.mm_per_unit, "given")->check(CLI::PositiveNumber);
   scale->add_option("--scale-from", options.scale_from,

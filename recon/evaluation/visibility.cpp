@@ -78,8 +78,10 @@ class Shooter {
 };
 
 Visibility See(const RayScene& scene, const FrameViews& views, int64_t count,
-               const std::function<Vec3d(int)>& position, const IsOwnFace& is_own_face) {
+               const std::function<Vec3d(int)>& position, const IsOwnFace& is_own_face,
+               std::vector<std::vector<int>>* frames) {
   Visibility result;
+  if (frames) frames->assign(count, {});
   result.frames_seeing.assign(count, 0);
   std::vector<std::atomic<int64_t>> seen_by(views.size());
   // Neighbouring places from one camera make coherent packets; the grain only has to outweigh a task's cost.
@@ -89,6 +91,7 @@ Visibility See(const RayScene& scene, const FrameViews& views, int64_t count,
       int64_t seen = 0;
       const auto count_seen = [&](int target) {
         ++result.frames_seeing[target];
+        if (frames) (*frames)[target].push_back(frame);
         ++seen;
       };
       for (int64_t i = first; i < last; ++i) {
@@ -128,14 +131,14 @@ Visibility SeeVertices(const RayScene& scene, const FrameViews& views) {
   const Mesh& mesh = scene.mesh();
   return See(
       scene, views, static_cast<int64_t>(mesh.vertices.size()), [&](int v) { return mesh.vertices[v]; },
-      [&](int v, uint32_t face) { return (mesh.faces[face].array() == v).any(); });
+      [&](int v, uint32_t face) { return (mesh.faces[face].array() == v).any(); }, nullptr);
 }
 
-Visibility SeePoints(const RayScene& scene, const std::vector<SurfacePoint>& points,
-                     const FrameViews& views) {
+Visibility SeePoints(const RayScene& scene, const std::vector<SurfacePoint>& points, const FrameViews& views,
+                     std::vector<std::vector<int>>* frames) {
   return See(
       scene, views, static_cast<int64_t>(points.size()), [&](int p) { return points[p].position; },
-      [&](int p, uint32_t face) { return static_cast<uint32_t>(points[p].face) == face; });
+      [&](int p, uint32_t face) { return static_cast<uint32_t>(points[p].face) == face; }, frames);
 }
 
 }  // namespace lumen

@@ -40,6 +40,8 @@ struct Visibility {
 // mesh lies between. A vertex isn't hidden by the faces it belongs to, nor a point by its own: a straight
 // line meets a plane once, so such a hit can only be a rounding error.
 Visibility SeeVertices(const RayScene& scene, const FrameViews& views);
-Visibility SeePoints(const RayScene& scene, const std::vector<SurfacePoint>& points, const FrameViews& views);
+// frames: if given, those that see each point, ascending.
+Visibility SeePoints(const RayScene& scene, const std::vector<SurfacePoint>& points, const FrameViews& views,
+                     std::vector<std::vector<int>>* frames = nullptr);
 
 }  // namespace lumen

@@ -120,11 +120,11 @@ void ReadPoints(const fs::path& file, ColmapModel* model) {
   for (uint64_t i = 0; i < count; ++i) {
     reader.Begin("point " + std::to_string(i));
     const uint64_t id = reader.Next<uint64_t>();
-    Vec3d position;
-    for (int axis = 0; axis < 3; ++axis) position[axis] = reader.Number();
-    model->points[id] = position;
-    reader.Skip(3, sizeof(uint8_t));  // colour
-    reader.Skip(1, sizeof(double));   // error
+    ColmapPoint point;
+    for (int axis = 0; axis < 3; ++axis) point.position[axis] = reader.Number();
+    for (uint8_t& channel : point.color) channel = reader.Next<uint8_t>();
+    point.error_px = reader.Number();
+    model->points[id] = point;
     reader.Skip(reader.Next<uint64_t>(), 2 * sizeof(uint32_t));
   }
   reader.End();

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "common/camera.h"
+#include "common/image.h"
 #include "common/math.h"
 
 namespace lumen {
@@ -36,10 +37,17 @@ struct ColmapImage {
   std::vector<ColmapObservation> observations;  // those that have a point
 };
 
+struct ColmapPoint {
+  Vec3d position = Vec3d::Zero();
+  Rgb8 color = {};
+  double error_px =
+      0;  // mean over its observations: from there to where the model's camera sees the position
+};
+
 struct ColmapModel {
   std::vector<ColmapCamera> cameras;
   std::vector<ColmapImage> images;
-  std::unordered_map<uint64_t, Vec3d> points;
+  std::unordered_map<uint64_t, ColmapPoint> points;
 };
 
 // cameras, images and points3D of a folder, .bin where there is a cameras.bin, else .txt; points3D may be
@@ -66,7 +74,7 @@ CameraIntrinsics FromColmap(const ColmapCamera& camera);
 // COLMAP's for a pinhole or Kannala–Brandt camera: PINHOLE or OPENCV_FISHEYE.
 ColmapCamera ToColmap(const CameraIntrinsics& camera);
 
-// cameras.txt, images.txt and points3D.txt (without points), every digit.
+// cameras.txt, images.txt and points3D.txt, every digit. A point's track are the images' observations of it.
 void WriteColmapText(const ColmapModel& model, const std::filesystem::path& folder);
 
 }  // namespace lumen

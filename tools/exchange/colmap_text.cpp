@@ -1,5 +1,8 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <limits>
+#include <map>
 #include <set>
 
 #include "common/error.h"
@@ -104,9 +107,11 @@ void ReadPoints(const fs::path& file, ColmapModel* model) {
   LineReader reader(file, text);
   while (NextElement(&reader, true)) {
     const int64_t id = reader.Integer("the point's id");
-    Vec3d position;
-    for (int i = 0; i < 3; ++i) position[i] = reader.Number("the position");
-    model->points[static_cast<uint64_t>(id)] = position;
+    ColmapPoint point;
+    for (int i = 0; i < 3; ++i) point.position[i] = reader.Number("the position");
+    for (uint8_t& channel : point.color) channel = static_cast<uint8_t>(reader.Integer("the colour"));
+    point.error_px = reader.Number("the error");
+    model->points[static_cast<uint64_t>(id)] = point;
   }
 }
 
@@ -152,6 +157,30 @@ ColmapModel ReadColmapModel(const fs::path& folder) {
   return model;
 }
 
+namespace {
+
+// A line a point, by id.
+std::string PointsText(const ColmapModel& model) {
+  std::map<uint64_t, std::string> tracks;
+  for (const ColmapImage& image : model.images) {
+    for (size_t i = 0; i < image.observations.size(); ++i) {
+      tracks[image.observations[i].point] += fmt::format(" {} {}", image.id, i);
+    }
+  }
+  std::string text = "# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n";
+  for (const auto& [id, track] : tracks) {
+    const ColmapPoint& point = model.points.at(id);
+    text += std::to_string(id);
+    for (double coordinate : point.position) AppendNumber(&(text += ' '), coordinate);
+    text += fmt::format(" {} {} {} ", point.color[0], point.color[1], point.color[2]);
+    AppendNumber(&text, point.error_px);
+    text += track + "\n";
+  }
+  return text;
+}
+
+}  // namespace
+
 void WriteColmapText(const ColmapModel& model, const fs::path& folder) {
   std::string cameras = "# CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n";
   for (const ColmapCamera& camera : model.cameras) {
@@ -169,13 +198,20 @@ void WriteColmapText(const ColmapModel& model, const fs::path& folder) {
     for (double value : {q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z()}) {
       AppendNumber(&(images += ' '), value);
     }
-    images += " " + std::to_string(image.camera) + " " + image.name + "\n\n";
+    images += " " + std::to_string(image.camera) + " " + image.name + "\n";
+    for (size_t i = 0; i < image.observations.size(); ++i) {
+      const ColmapObservation& observation = image.observations[i];
+      if (i > 0) images += ' ';
+      AppendNumber(&images, observation.pixel.x() + kHalfPixel);
+      AppendNumber(&(images += ' '), observation.pixel.y() + kHalfPixel);
+      images += " " + std::to_string(observation.point);
+    }
+    images += '\n';
   }
   CreateFolder(folder);
   WriteFile(folder / "cameras.txt", cameras);
   WriteFile(folder / "images.txt", images);
-  WriteFile(folder / "points3D.txt",
-            "# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n");
+  WriteFile(folder / "points3D.txt", PointsText(model));
 }
 
 }  // namespace lumen

@@ -11,6 +11,7 @@
 #include "tools/exchange/colmap_model.h"
 #include "tools/exchange/npz.h"
 #include "tools/exchange/rectification.h"
+#include "tools/exchange/wall_points.h"
 
 namespace lumen {
 namespace {
@@ -90,7 +91,18 @@ std::vector<Pose> Poses(const Sequence& sequence, const Substitute& substitute) 
   return poses;
 }
 
-void WriteColmap(const Sequence& sequence, const Substitute& substitute, const fs::path& folder) {
+// The pixel that shows a place in camera axes; nothing where the image is masked.
+std::optional<Vec2d> Shown(const Camera<double>& camera, const Image8& mask, const Vec3d& place) {
+  const auto pixel = camera.Project(place);
+  if (!pixel) return std::nullopt;
+  const double x = std::round(pixel->x()), y = std::round(pixel->y());
+  if (!(x >= 0 && y >= 0 && x < mask.width && y < mask.height)) return std::nullopt;
+  if (*mask.Pixel(static_cast<int>(x), static_cast<int>(y)) == 0) return std::nullopt;
+  return pixel;
+}
+
+ColmapModel WriteColmap(const Sequence& sequence, const ExportOptions& options, const Substitute& substitute,
+                        const fs::path& folder) {
   ColmapModel model;
   model.cameras.push_back(ToColmap(substitute.camera));
   const std::vector<Pose> poses = Poses(sequence, substitute);
@@ -102,7 +114,18 @@ void WriteColmap(const Sequence& sequence, const Substitute& substitute, const f
     image.camera_from_world = poses[i].inverse();
     model.images.push_back(image);
   }
+  if (sequence.ground_truth_mesh.empty()) {
+    Say(sequence.folder.string() + ": no true wall is known: points3D.txt stays empty");
+  } else if (options.points > 0) {
+    // Images stay as they are but for rectified ones.
+    const Camera<double> camera(substitute.rectification ? substitute.camera : sequence.calibration.camera);
+    const auto shown = [&](size_t frame, const Vec3d& world) {
+      return Shown(camera, substitute.mask, sequence.frames[frame].world_from_camera.inverse() * world);
+    };
+    AddWallPoints(sequence, options.points, shown, &model);
+  }
   WriteColmapText(model, folder / "sparse/0");
+  return model;
 }
 
 void WriteNerfstudio(const Sequence& sequence, const Substitute& substitute, const fs::path& folder) {
@@ -168,9 +191,13 @@ ExportResult ExportSequence(const Sequence& sequence, const ExportOptions& optio
   WriteImages(sequence, options, substitute, folder);
   ExportResult result;
   switch (options.format) {
-    case ExportFormat::kColmap:
-      WriteColmap(sequence, substitute, folder);
+    case ExportFormat::kColmap: {
+      const ColmapModel model = WriteColmap(sequence, options, substitute, folder);
+      result.points = static_cast<int>(model.points.size());
+      for (const ColmapImage& image : model.images)
+        result.observations += static_cast<int64_t>(image.observations.size());
       break;
+    }
     case ExportFormat::kNerfstudio:
       WriteNerfstudio(sequence, substitute, folder);
       break;

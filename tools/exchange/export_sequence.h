@@ -16,6 +16,7 @@ struct ExportOptions {
   bool rectify = false;     // pinhole images in any format; NeuS has no others
   double fov_deg = 100;     // of the pinhole, across the image
   double max_fit_px = 1.5;  // a fisheye that fits worse somewhere is refused
+  int points = 10'000;      // COLMAP: places spread over the true wall, of which those seen twice are written
   bool link = false;        // symbolic links in place of copies, where images stay as they are
 };
 
@@ -24,11 +25,14 @@ struct ExportResult {
   std::optional<FisheyeFit> fit;  // where a fisheye stands for the camera
   double masked_part = 0;         // of the exported pixels
   int frames = 0;
+  int points = 0;               // COLMAP: that two frames or more see
+  int64_t observations = 0;     // of them
   double sphere_radius_mm = 0;  // NeuS: what its unit sphere is
 };
 
 // Writes into a folder, which must not hold an export already; lengths stay mm, world axes the sequence's:
-//   COLMAP       images/, mask.png (for ImageReader.camera_mask_path), sparse/0/{cameras,images,points3D}.txt
+//   COLMAP       images/, mask.png (for ImageReader.camera_mask_path), sparse/0/ with cameras, images and
+//                points3D.txt: AddWallPoints (wall_points.h), none where the sequence has no true wall
 //   nerfstudio   images/, mask.png, transforms.json (cameras' axes OpenGL's)
 //   NeuS         image/, mask/, cameras_sphere.npz: world_mat_i projects mm of the world to pixels (the
 //   centre

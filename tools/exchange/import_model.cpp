@@ -11,6 +11,7 @@
 #include "common/pose_file.h"
 #include "common/progress.h"
 #include "tools/exchange/colmap_model.h"
+#include "tools/exchange/fisheye_fit.h"
 
 namespace lumen {
 namespace {
@@ -67,14 +68,40 @@ void SortByNumber(std::vector<ColmapImage>* images, std::vector<int>* numbers) {
   std::ranges::sort(*numbers);
 }
 
-// Light, response, mask and gains, from the calibration's sequence or C3VD's own.
-void Calibrate(const ImportOptions& options, Sequence* sequence) {
-  const CameraIntrinsics camera = sequence->calibration.camera;
+// Whether `exported` is what an export writes in place of the calibration's camera; the fit, if so. Its
+// numbers are written with every digit; other programs may keep a few less.
+std::optional<FisheyeFit> FitBehind(const CameraIntrinsics& exported, const Calibration& calibration) {
+  const CameraIntrinsics& own = calibration.camera;
+  if (own.model != CameraModel::kScaramuzza || exported.model != CameraModel::kKannalaBrandt ||
+      own.width != exported.width || own.height != exported.height) {
+    return std::nullopt;
+  }
+  const FisheyeFit fit = FitFisheye(calibration);
+  constexpr double kSame = 1e-6;  // px, and parts of a radius
+  const auto same = [](double a, double b) { return std::abs(a - b) <= kSame; };
+  const bool all = same(fit.camera.fx, exported.fx) && same(fit.camera.fy, exported.fy) &&
+                   same(fit.camera.cx, exported.cx) && same(fit.camera.cy, exported.cy) &&
+                   std::ranges::equal(fit.camera.k, exported.k, same);
+  return all ? std::optional(fit) : std::nullopt;
+}
+
+// Light, response, mask and gains, from the calibration's sequence or C3VD's own; and its camera, where the
+// model's stands for it: its images and the sequence's poses are turned back.
+void Calibrate(const ImportOptions& options, std::vector<ColmapImage>* images, Sequence* sequence,
+               ImportResult* result) {
+  CameraIntrinsics camera = sequence->calibration.camera;
   if (options.calibration.empty()) {
     sequence->calibration = C3vdCalibration();
     sequence->calibration.mask = Image8();
   } else {
     const Sequence like = ReadSequence(options.calibration);
+    if (const auto fit = FitBehind(camera, like.calibration)) {
+      const Mat3d back = Eigen::AngleAxisd(-fit->roll_rad, Vec3d::UnitZ()).toRotationMatrix();
+      for (ColmapImage& image : *images) image.camera_from_world.prerotate(back);
+      for (SequenceFrame& frame : sequence->frames) frame.world_from_camera.rotate(back.transpose());
+      camera = like.calibration.camera;
+      result->turned_back_rad = fit->roll_rad;
+    }
     sequence->calibration = like.calibration;
     Image8& mask = sequence->calibration.mask;
     if (mask.width != camera.width || mask.height != camera.height) mask = Image8();
@@ -176,8 +203,8 @@ ImportResult ImportModel(const ImportOptions& options, const fs::path& folder) {
     frame.world_from_camera = model.images[i].camera_from_world.inverse();
     sequence.frames.push_back(frame);
   }
-  Calibrate(options, &sequence);
   ImportResult result;
+  Calibrate(options, &model.images, &sequence, &result);
   result.frames = static_cast<int>(numbers.size());
   SetScale(options, model, &sequence, &result);
   CreateFolder(folder);

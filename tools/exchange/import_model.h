@@ -13,7 +13,8 @@ namespace lumen {
 struct ImportOptions {
   std::filesystem::path model, images;
   // A sequence whose light, response and gains (by frame number), and whose mask where it fits, are taken;
-  // empty: C3VD's built-in light and response, gains unknown.
+  // empty: C3VD's built-in light and response, gains unknown. Where the model's camera is the fisheye that an
+  // export of the sequence has in place of its own, that one is taken back, and the poses' turn with it.
   std::filesystem::path calibration;
   // Millimetres of one unit of the model: this; or from given poses (a file in pose.txt's layout, a line a
   // frame, or a line for every number), whose axes are taken as well; or from the light. Of these three one
@@ -28,6 +29,8 @@ struct ImportOptions {
 struct ImportResult {
   int frames = 0;
   double mm_per_unit = 1;
+  std::optional<double>
+      turned_back_rad;  // about the axis, where the calibration's camera takes its place back
   std::optional<SimilarityFit> from_poses;
   std::optional<LightScale> from_light;
 };

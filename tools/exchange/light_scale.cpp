@@ -34,12 +34,12 @@ Vec3d NormalAt(const std::vector<Vec3d>& points, const Vec3d& place) {
 }
 
 // Some of the points, evenly over their ids, with their normals.
-std::unordered_map<uint64_t, Vec3d> Normals(const std::unordered_map<uint64_t, Vec3d>& points) {
+std::unordered_map<uint64_t, Vec3d> Normals(const std::unordered_map<uint64_t, ColmapPoint>& points) {
   std::vector<uint64_t> ids;
-  for (const auto& [id, position] : points) ids.push_back(id);
+  for (const auto& [id, point] : points) ids.push_back(id);
   std::sort(ids.begin(), ids.end());
   std::vector<Vec3d> positions;
-  for (uint64_t id : ids) positions.push_back(points.at(id));
+  for (uint64_t id : ids) positions.push_back(points.at(id).position);
   const size_t taken = std::min(ids.size(), kMostPoints);
   std::vector<Vec3d> normals(taken);
   ParallelFor(0, static_cast<int64_t>(taken),
@@ -61,7 +61,7 @@ double SentAlong(const Light& light, const Vec3d& ray) {
 }  // namespace
 
 LightScale ScaleFromLight(const Sequence& sequence, const std::vector<ColmapImage>& images,
-                          const std::unordered_map<uint64_t, Vec3d>& points, double albedo) {
+                          const std::unordered_map<uint64_t, ColmapPoint>& points, double albedo) {
   const Calibration& calibration = sequence.calibration;
   if (!calibration.light.calibrated) {
     throw InputError("the light's power is unknown (light.calibrated = false): it can't tell the scale");
@@ -82,7 +82,7 @@ LightScale ScaleFromLight(const Sequence& sequence, const std::vector<ColmapImag
     for (const ColmapObservation& observation : images[i].observations) {
       const auto normal = normals.find(observation.point);
       if (normal == normals.end()) continue;
-      const Vec3d place = images[i].camera_from_world * points.at(observation.point);
+      const Vec3d place = images[i].camera_from_world * points.at(observation.point).position;
       const double x = std::round(observation.pixel.x()), y = std::round(observation.pixel.y());
       if (!(x >= 0 && y >= 0 && x < color.width && y < color.height)) continue;
       const uint8_t value = color.Pixel(static_cast<int>(x), static_cast<int>(y))[kGreen];

@@ -31,6 +31,6 @@ struct LightScale {
 // frames[i] is the sequence's frame of images[i]; its light must be calibrated and its gains known. `albedo`:
 // of the wall in green. Throws InputError where that is not so, or too few points are seen.
 LightScale ScaleFromLight(const Sequence& sequence, const std::vector<ColmapImage>& images,
-                          const std::unordered_map<uint64_t, Vec3d>& points, double albedo);
+                          const std::unordered_map<uint64_t, ColmapPoint>& points, double albedo);
 
 }  // namespace lumen
