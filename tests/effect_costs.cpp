@@ -85,9 +85,9 @@ extern "C" {
 [[gnu::noinline]] void FramePart(const lumen::Scene& scene, Frame* frame) {
   lumen::MovingWall walls(scene.geometry, {scene.peristalsis, scene.surface.coat.has_value()});
   const size_t before = allocated_bytes;
-  const auto wall = walls.At(0);
+  walls.At(0);
   const size_t with_wall = allocated_bytes;
-  frame->picture = lumen::FrameSetup(scene, *wall, 0, 1).Take(1);
+  frame->picture = lumen::FrameSetup(scene, &walls, 0, 1).Take(1);
   frame->wall_bytes = with_wall - before;
   frame->bytes = allocated_bytes - with_wall;
 }

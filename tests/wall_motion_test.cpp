@@ -39,7 +39,7 @@ struct Scenery {
   explicit Scenery(const Shutter& shutter)
       : shutter(shutter), wall(walls.During(kFrame, shutter.Duration())) {
     surface.mottling = Mottling{0.6, 5};
-    surface.vessels = Vessels{};
+    surface.vessels.emplace(VesselOptions{}, geometry.mesh, 1);
     light.sources.push_back({Vec3d(2, 1, 0), Vec3d::UnitZ(), 1, Vec3d(400, 500, 600)});
     for (int i = 0; i < 2 * kFrame; ++i) {
       poses.push_back(Pose(Eigen::Translation3d(1, 0.8 * i - 2, -10 - 1.5 * i) *
