@@ -175,16 +175,11 @@ Lanes3 Coat::EvalBase(const CoatedLanes& places, const Lanes3& incoming) const {
   return places.albedo * (cosine > 0.0f ? Transmission(places, incoming) * cosine * kInversePi : Lanes{});
 }
 
-CoatLobesLanes Coat::Eval(const CoatedLanes& places, const Lanes3& incoming) const {
+Lanes Coat::EvalGlint(const CoatedLanes& places, const Lanes3& incoming) const {
   const Lanes zero{};
-  const Lanes cosine = Dot(incoming, places.normal), cos_in = Dot(incoming, places.coat_normal);
-  const Lanes cos_out = Dot(places.outgoing, places.coat_normal);
-  const LanesI lit = cosine > 0.0f;
-  CoatLobesLanes lobes;
-  lobes.base = EvalBase(places, incoming);
-  lobes.glint = zero;
-  const LanesI mirrors = lit & (cos_in > 0.0f) & (cos_out > 0.0f);
-  if (!Any(mirrors)) return lobes;
+  const Lanes cos_in = Dot(incoming, places.coat_normal), cos_out = Dot(places.outgoing, places.coat_normal);
+  const LanesI mirrors = (Dot(incoming, places.normal) > 0.0f) & (cos_in > 0.0f) & (cos_out > 0.0f);
+  if (!Any(mirrors)) return zero;
   const Lanes3 half = Normalized(incoming + places.outgoing);
   const Lanes visibility = 0.5f / (cos_out * Slant(alpha_, cos_in) + cos_in * Slant(alpha_, cos_out));
   const Lanes c = Min(Max(Dot(half, places.outgoing), zero), Broadcast(1));
@@ -193,8 +188,11 @@ CoatLobesLanes Coat::Eval(const CoatedLanes& places, const Lanes3& incoming) con
   const Lanes perpendicular = (c - ior_ * refracted) / (c + ior_ * refracted);
   const Lanes fresnel = 0.5f * (parallel * parallel + perpendicular * perpendicular);
   const Lanes glint = cos_in * fresnel * visibility * Distribution(alpha_, half, places.coat_normal);
-  lobes.glint = mirrors ? glint : zero;
-  return lobes;
+  return mirrors ? glint : zero;
+}
+
+CoatLobesLanes Coat::Eval(const CoatedLanes& places, const Lanes3& incoming) const {
+  return {EvalBase(places, incoming), EvalGlint(places, incoming)};
 }
 
 // How many of the sampled directions are the coat's: its part of what leaves the place.
@@ -215,16 +213,20 @@ float Coat::Pdf(const CoatedPlace& place, const Vec3f& incoming) const {
   return pdf;
 }
 
+Lanes Coat::GlintPdf(const CoatedLanes& places, const Lanes3& incoming) const {
+  const Lanes cos_out = Dot(places.outgoing, places.coat_normal);
+  const Lanes distribution = Distribution(alpha_, Normalized(incoming + places.outgoing), places.coat_normal);
+  return cos_out > 0.0f ? distribution / (2.0f * (cos_out + Slant(alpha_, cos_out))) : Lanes{};
+}
+
 Lanes Coat::Pdf(const CoatedLanes& places, const Lanes3& incoming) const {
   const Lanes zero{};
   const Lanes cos_out = Dot(places.outgoing, places.coat_normal), cosine = Dot(incoming, places.normal);
   const Lanes palest = Max(places.albedo.x, Max(places.albedo.y, places.albedo.z));
-  const LanesI mirrors = cos_out > 0.0f;
-  const Lanes share =
-      mirrors ? places.reflectance / (places.reflectance + (1.0f - places.reflectance) * palest) : zero;
-  const Lanes distribution = Distribution(alpha_, Normalized(incoming + places.outgoing), places.coat_normal);
-  const Lanes mirrored = mirrors ? distribution / (2.0f * (cos_out + Slant(alpha_, cos_out))) : zero;
-  return (1.0f - share) * (cosine > 0.0f ? cosine * kInversePi : zero) + share * mirrored;
+  const Lanes share = cos_out > 0.0f
+                          ? places.reflectance / (places.reflectance + (1.0f - places.reflectance) * palest)
+                          : zero;
+  return (1.0f - share) * (cosine > 0.0f ? cosine * kInversePi : zero) + share * GlintPdf(places, incoming);
 }
 
 Vec3f Coat::Mirrored(const CoatedPlace& place, const Vec2f& random) const {

@@ -123,7 +123,8 @@ class Coat {
   CoatLobes Eval(const CoatedPlace& place, const Vec3f& incoming) const;
   // The same in sixteen places at once, to rounding.
   CoatLobesLanes Eval(const CoatedLanes& places, const Lanes3& incoming) const;
-  // The second lobe alone, and the sum of both in each channel.
+  // One lobe alone, and the sum of both in each channel.
+  Lanes EvalGlint(const CoatedLanes& places, const Lanes3& incoming) const;
   Lanes3 EvalBase(const CoatedLanes& places, const Lanes3& incoming) const;
   Lanes3 EvalBoth(const CoatedLanes& places, const Lanes3& incoming) const {
     const CoatLobesLanes lobes = Eval(places, incoming);
@@ -133,6 +134,8 @@ class Coat {
   Lanes Transmission(const CoatedLanes& places, const Lanes3& incoming) const;
   float Pdf(const CoatedPlace& place, const Vec3f& incoming) const;
   Lanes Pdf(const CoatedLanes& places, const Lanes3& incoming) const;
+  // SampleGlint's, before it leaves directions out.
+  Lanes GlintPdf(const CoatedLanes& places, const Lanes3& incoming) const;
   // choice: in [0, 1), picks the lobe. The direction may be below the wall, where Eval is 0.
   Vec3f Sample(const CoatedPlace& place, const Vec2f& random, float choice) const;
   // A direction for the first lobe alone, and what that lobe sends on over the direction's density: at

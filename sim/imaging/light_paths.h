@@ -6,16 +6,11 @@
 //
 // A guide sends a share of its power, intensity · exp(−spread · (1 − D·L)), along each of n directions that
 // are drawn with that density; at the wall, y, they go on by the coat's first lobe. Where such a path then
-// meets the wall, z, the camera sees what the base lobe sends of it: with the path's power Φ, mm² sr, a
-// pixel's mean radiance gains
-//
-//   Φ · f_base(i, o) · V · (o·n)/d² · a
-//
-// with o the direction and d the distance to the camera, V whether it is seen and a the area of the image,
-// px², that a steradian about o fills (Camera::AreaPerSteradian). From z paths go on by both lobes. The
-// glints' lobe is written for light that is followed from the viewer, as irradiance · f (i·s) with s the
-// relief's normal and not the wall's: along a path from the light it weighs (i·s)(o·n)/((i·n)(o·s)) times as
-// much as towards it (Veach, section 5.3, adjoint of shading normals).
+// meets the wall in a pixel's sight, it leaves a photon, whose light photon_joins.h brings to the camera.
+// From there paths go on by both lobes. The glints' lobe is written for light that is followed from the
+// viewer, as irradiance · f (i·s) with s the relief's normal and not the wall's: along a path from the light
+// it weighs (i·s)(o·n)/((i·n)(o·s)) times as much as towards it (Veach, section 5.3, adjoint of shading
+// normals).
 //
 // The paths are those whose vertex next to a guide is a glint and whose vertex next to the camera is another
 // one and isn't; estimators that start at the camera leave just these out (GuideLobes::kBase). Bounces count
@@ -32,6 +27,7 @@
 #include "common/light.h"
 #include "common/parallel.h"
 #include "sim/imaging/bounce_paths.h"
+#include "sim/imaging/photon.h"
 
 namespace lumen {
 
@@ -58,12 +54,13 @@ class LightPaths {
         paths_(scene, options, GuideLobes::kAll) {
     const auto& valid = view.valid->data;
     const double pixels = static_cast<double>(valid.size() - std::count(valid.begin(), valid.end(), 0));
+    const double paths = std::min(kPathsPerPixel * pixels, kMostPaths);
     double whole = 0;
     for (const Guide& guide : eye.guides) whole += Power(guide);
     for (const Guide& guide : eye.guides) {
       if (!(Power(guide) > 0)) continue;
       Beam beam{&guide, TangentFrame(guide.direction), packets_, 1, 1, {}};
-      const double packets = kPathsPerPixel * pixels / kLanes * (Power(guide) / whole);
+      const double packets = paths / kLanes * (Power(guide) / whole);
       beam.rows = std::max(1, static_cast<int>(std::lround(std::sqrt(packets / kColumnsPerRow))));
       beam.columns = std::max(1, static_cast<int>(std::lround(packets / beam.rows)));
       const int64_t count = int64_t{beam.rows} * beam.columns;
@@ -74,38 +71,34 @@ class LightPaths {
     }
   }
 
-  // Traces all samples. splat(sample, x, y, light): adds to a pixel's sum over samples; always called in the
-  // same order. Rays are counted.
-  template <class OnSplat>
-  void Trace(int64_t* rays, const OnSplat& splat) const {
+  // The photons of a frame's sample, always in the same order. Rays are counted.
+  std::vector<Photon> Trace(uint32_t sample, int64_t* rays) const {
     const int64_t chunks = (packets_ + kPacketsPerChunk - 1) / kPacketsPerChunk;
-    std::vector<Chunk> pass(kChunksPerPass);
-    for (int64_t first = 0; first < chunks * options_.samples; first += kChunksPerPass) {
-      const int64_t last = std::min(first + kChunksPerPass, chunks * options_.samples);
-      ParallelFor(first, last, [&](int64_t i) {
-        const int64_t begin = i % chunks * kPacketsPerChunk;
-        pass[i - first].splats.clear();
-        pass[i - first].rays = 0;
-        TraceChunk(begin, std::min(begin + kPacketsPerChunk, packets_), static_cast<uint32_t>(i / chunks),
-                   &pass[i - first]);
-      });
-      for (int64_t i = first; i < last; ++i) {
-        *rays += pass[i - first].rays;
-        for (const Splat& s : pass[i - first].splats) splat(static_cast<int>(i / chunks), s.x, s.y, s.light);
-      }
+    std::vector<Chunk> all(static_cast<size_t>(chunks));
+    ParallelFor(0, chunks, [&](int64_t i) {
+      const int64_t begin = i * kPacketsPerChunk;
+      TraceChunk(begin, std::min(begin + kPacketsPerChunk, packets_), sample, &all[i]);
+    });
+    std::vector<Photon> photons;
+    for (const Chunk& chunk : all) {
+      *rays += chunk.rays;
+      photons.insert(photons.end(), chunk.photons.begin(), chunk.photons.end());
     }
+    return photons;
   }
 
  private:
   // The guides' paths for each sample and pixel that is rendered, and those that go on from the first wall
-  // for each that the coat sends on all light of; least time to a given noise, of 1 to 8 and of 1 to 8.
-  static constexpr double kPathsPerPixel = 4;
-  static constexpr float kPathsOfWeight = 2;
+  // for each that the coat sends on all light of; least time to a given noise, of 0.15 to 4 and of 0.4 to 20.
+  static constexpr double kPathsPerPixel = 0.5;
+  static constexpr float kPathsOfWeight = 1;
+  // Of a sample at most. A tenth of them leave photons, of 160 bytes, or fewer.
+  static constexpr double kMostPaths = 2e6;
   // A part of all directions that is worth while: a fiftieth.
   static constexpr double kLeastView_sr = 0.25;
   // Of a beam's cells, so that they are about as long as wide at the middle of its power.
   static constexpr int kColumnsPerRow = 4;
-  static constexpr int kPacketsPerChunk = 256, kChunksPerPass = 64;
+  static constexpr int kPacketsPerChunk = 256;
   static constexpr uint64_t kPathKey = 1ull << 37;  // with a path's number, neither a pixel's nor a tile's
   static constexpr uint32_t kGuidePair = 0;
   static constexpr BouncePairs kPairs{1};
@@ -118,18 +111,14 @@ class LightPaths {
     int rows, columns;
     Vec3f power;  // a path's
   };
-  struct Splat {
-    int x, y;
-    Vec3f light;
-  };
   struct Chunk {
-    std::vector<Splat> splats;
+    std::vector<Photon> photons;
     int64_t rays = 0;
   };
   // Paths that leave the wall; their weight is their power.
   struct Waiting {
     BounceStart start;
-    float level[kLanes];  // what the roulette keeps the power's largest channel at
+    PhotonSource source[kLanes];  // where they leave it
     int count = 0;
   };
 
@@ -187,16 +176,17 @@ class LightPaths {
       const CoatedPlace place = places.lanes()[i];
       const Coat::Glint glint = places.coat->SampleGlint(place, Vec2f(u[i], v[i]));
       if (!(glint.weight > 0)) continue;
-      const float weight = glint.weight * AdjointOfGlint(place, glint.incoming);
+      const float weight = glint.weight * GlintFromLight(place, glint.incoming);
       const float survival = std::min(1.0f, kPathsOfWeight * weight);
       if (choice[i] >= survival) continue;
       const int lane = waiting->count++;
+      waiting->source[lane] = {places.point[i], place, beam.power, beam.power.maxCoeff() / kPathsOfWeight,
+                               true};
       waiting->start.on[lane] = -1;
       waiting->start.origin.Set(lane, origin[i]);
       waiting->start.direction.Set(lane, glint.incoming);
       waiting->start.weight.Set(lane, beam.power * (weight / survival));
       waiting->start.samplers[lane].emplace(seed_, keys[i], sample, options_.sampler);
-      waiting->level[lane] = beam.power.maxCoeff() / kPathsOfWeight;
       if (waiting->count == kLanes) Follow(waiting, chunk);
     }
   }
@@ -223,13 +213,6 @@ class LightPaths {
     return rays;
   }
 
-  // What the first lobe weighs along a path from the light, which place.outgoing points to, over what it does
-  // along one from the viewer.
-  static float AdjointOfGlint(const CoatedPlace& place, const Vec3f& toward) {
-    return place.outgoing.dot(place.coat_normal) * toward.dot(place.normal) /
-           (place.outgoing.dot(place.normal) * toward.dot(place.coat_normal));
-  }
-
   // From the first wall on to others, until no path is left; then none waits.
   void Follow(Waiting* waiting, Chunk* chunk) const {
     BounceStart& start = waiting->start;
@@ -238,7 +221,7 @@ class LightPaths {
       const CoatedPlaces places =
           paths_.Meet(eye_.time, start.on, start.origin, start.direction, &hits, &chunk->rays);
       start.on = places.alive;
-      AddSplats(places, start, chunk);
+      AddPhotons(places, *waiting, chunk);
       if (bounce == options_.bounces) break;
       GoOn(places, bounce + 1, waiting);
     }
@@ -256,10 +239,12 @@ class LightPaths {
       const CoatedPlace place = places.lanes()[i];
       const Vec3f toward = places.coat->Sample(place, sampler.Pair(kPairs.Direction(bounce)), chance[1]);
       const CoatLobes lobes = places.coat->Eval(place, toward);
-      const float glint = lobes.glint > 0 ? lobes.glint * AdjointOfGlint(place, toward) : 0.0f;
+      const float glint = lobes.glint > 0 ? lobes.glint * GlintFromLight(place, toward) : 0.0f;
       const Vec3f power = start.weight[i].cwiseProduct((lobes.base + Vec3f::Constant(glint)) /
                                                        places.coat->Pdf(place, toward));
-      const float survival = std::min(1.0f, power.maxCoeff() / waiting->level[i]);
+      PhotonSource& source = waiting->source[i];
+      source = {places.point[i], place, start.weight[i], source.level, false};
+      const float survival = std::min(1.0f, power.maxCoeff() / source.level);
       if (chance[0] >= survival) {
         start.on[i] = 0;
         continue;
@@ -269,25 +254,15 @@ class LightPaths {
     }
   }
 
-  // What the camera sees of the paths' light at places: by the coat that it looks through.
-  void AddSplats(const CoatedPlaces& places, const BounceStart& start, Chunk* chunk) const {
+  // Where the camera sees paths meet the wall.
+  void AddPhotons(const CoatedPlaces& places, const Waiting& waiting, Chunk* chunk) const {
     const Lanes3 to_eye = Broadcast(eye_.origin) - places.point;
-    const Lanes squared = Dot(to_eye, to_eye), facing = Dot(to_eye, places.normal);
-    const LanesI turned = places.alive & (facing > 0.0f);
+    const LanesI turned = places.alive & (Dot(to_eye, places.normal) > 0.0f);
     if (!Any(turned)) return;
-    const Lanes3 outgoing = to_eye * (1.0f / Sqrt(squared));
-    const Coat& coat = *scene_.surface->coat;
-    CoatedLanes seen = places.lanes();
-    seen.outgoing = outgoing;
-    seen.reflectance = coat.Reflectance(Dot(outgoing, seen.coat_normal));
-    const Lanes3 light = start.weight * places.albedo *
-                         (coat.Transmission(seen, places.outgoing) * Dot(outgoing, places.normal) / squared *
-                          static_cast<float>(1 / kPi));
     const Lanes3 from = OffsetOrigin(places.point, places.normal);
     for (int i = 0; i < kLanes; ++i) {
       if (!turned[i]) continue;
-      const Vec3f in_camera = eye_.rotation.transpose() * -to_eye[i];
-      const auto pixel = view_.camera->Project(in_camera);
+      const auto pixel = view_.camera->Project(eye_.rotation.transpose() * -to_eye[i]);
       if (!pixel) continue;
       const Vec2f corner = (*pixel + Vec2f(0.5f, 0.5f)).array().floor();
       if (!(corner[0] >= 0 && corner[1] >= 0 && corner[0] < static_cast<float>(view_.valid->width) &&
@@ -299,7 +274,8 @@ class LightPaths {
       ++chunk->rays;
       const Vec3f origin = from[i];
       if (scene_.wall->Occluded(origin, eye_.origin - origin, 0, 1, eye_.time)) continue;
-      chunk->splats.push_back({x, y, light[i] * view_.camera->AreaPerSteradian(*pixel, in_camera)});
+      chunk->photons.push_back({waiting.source[i], places.point[i], places.normal[i], places.albedo[i],
+                                places.coat_normal[i], *pixel, x, y});
     }
   }
 

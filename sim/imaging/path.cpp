@@ -12,6 +12,7 @@
 #include "sim/imaging/glint_paths.h"
 #include "sim/imaging/guide_light.h"
 #include "sim/imaging/light_paths.h"
+#include "sim/imaging/photon_joins.h"
 #include "sim/imaging/pixel_samples.h"
 #include "sim/imaging/places.h"
 #include "sim/imaging/sampler.h"
@@ -53,13 +54,13 @@ class Tracer {
         direct_samples_(options.samples * options.direct_oversampling),
         seed_(seed),
         frame_(static_cast<uint64_t>(frame)),
-        from_guides_(kCoat && LightPaths::Serve(scene, view, options)),
+        pinhole_(!view.defocus || view.defocus->aperture_mm == 0),
+        eye_(*scene.wall, *view.light, view.world_from_camera, pinhole_),
+        light_paths_(PathsFromGuides()),
         finder_(scene),
         own_paths_(scene, options, LobesOfBase()),
         shared_paths_(scene, options, LobesOfBase()),
-        mirrored_paths_(scene, options, GuideLobes::kAll),
-        pinhole_(!view.defocus || view.defocus->aperture_mm == 0),
-        eye_(*scene.wall, *view.light, view.world_from_camera, pinhole_) {
+        glint_paths_(GlintPathsOf(scene, options)) {
     if (scene.surface->subsurface) walks_.emplace(scene);
   }
 
@@ -73,21 +74,22 @@ class Tracer {
     if (with_parts && kCoat) film->glint = film->radiance;
     if (with_parts && walks_) film->subsurface = film->radiance;
     PathCount total;
-    ForEachTile(0, 0, &total, [&](const TilePixels& pixels, uint64_t, PathCount* count) {
-      TraceDirect(pixels, film, count);
-    });
+    ForEachTile({width, height, 0, 0}, &total,
+                [&](const TilePixels& pixels, int, PathCount* count) { TraceDirect(pixels, film, count); });
     if (options_.bounces == 0) return total;
     indirect_.resize(film->radiance.data.size());
     if (kCoat && walks_) mirrored_.resize(indirect_.size());
     for (int sample = 0; sample < options_.samples; ++sample) {
       const uint64_t shift = RandomBits(seed_, frame_, kShiftKey, static_cast<uint64_t>(sample));
-      ForEachTile(static_cast<int>(shift % kTileEdge), static_cast<int>(shift / kTileEdge % kTileEdge),
-                  &total, [&](const TilePixels& pixels, uint64_t key, PathCount* count) {
-                    TraceIndirect(pixels, key, sample, count);
-                  });
-    }
-    if constexpr (kCoat) {
-      if (from_guides_) TraceFromGuides(&total);
+      const TileGrid grid(width, height, static_cast<int>(shift % kTileEdge),
+                          static_cast<int>(shift / kTileEdge % kTileEdge));
+      std::optional<PhotonsOfTiles> photons;
+      if (light_paths_) {
+        photons.emplace(light_paths_->Trace(static_cast<uint32_t>(sample), &total.rays), grid);
+      }
+      ForEachTile(grid, &total, [&](const TilePixels& pixels, int tile, PathCount* count) {
+        TraceIndirect(pixels, tile, sample, photons ? &*photons : nullptr, count);
+      });
     }
     AddIndirect(film);
     return total;
@@ -97,19 +99,16 @@ class Tracer {
   static constexpr uint64_t kShiftKey = 1ull << 63;  // no pixel's
   static constexpr uint64_t kTileKey = 1ull << 39;   // with a tile's number, no pixel's
 
-  // trace(pixels, key, count) for each tile that holds pixels to render; key: of the tile's random numbers.
+  // trace(pixels, tile, count) for each tile that holds pixels to render; tile: its number.
   template <class Trace>
-  void ForEachTile(int shift_x, int shift_y, PathCount* total, const Trace& trace) const {
-    const int columns = (view_.valid->width + shift_x + kTileEdge - 1) / kTileEdge;
-    const int rows = (view_.valid->height + shift_y + kTileEdge - 1) / kTileEdge;
-    std::vector<PathCount> counts(static_cast<size_t>(rows));
-    ParallelFor(0, rows, [&](int64_t row) {
-      for (int column = 0; column < columns; ++column) {
-        const TilePixels pixels(column * kTileEdge - shift_x, static_cast<int>(row) * kTileEdge - shift_y,
-                                *view_.valid);
+  void ForEachTile(const TileGrid& grid, PathCount* total, const Trace& trace) const {
+    std::vector<PathCount> counts(static_cast<size_t>(grid.rows));
+    ParallelFor(0, grid.rows, [&](int64_t row) {
+      for (int column = 0; column < grid.columns; ++column) {
+        const TilePixels pixels(column * kTileEdge - grid.shift_x,
+                                static_cast<int>(row) * kTileEdge - grid.shift_y, *view_.valid);
         if (pixels.Empty()) continue;
-        const uint64_t key = (frame_ << 40) ^ kTileKey ^ static_cast<uint64_t>(row * columns + column);
-        trace(pixels, key, &counts[row]);
+        trace(pixels, static_cast<int>(row) * grid.columns + column, &counts[row]);
       }
     });
     for (const PathCount& count : counts) {
@@ -208,56 +207,80 @@ class Tracer {
     }
   }
 
-  void TraceIndirect(const TilePixels& pixels, uint64_t key, int sample, PathCount* count) {
+  void TraceIndirect(const TilePixels& pixels, int tile_number, int sample, const PhotonsOfTiles* photons,
+                     PathCount* count) {
+    const uint64_t key = (frame_ << 40) ^ kTileKey ^ static_cast<uint64_t>(tile_number);
     TileSample<kCoat> tile;
-    std::optional<GlintPaths> glints;
-    if constexpr (kCoat) glints.emplace(mirrored_paths_, kGlintPairs, walks_ ? tile.mirrored : tile.indirect);
+    HitPacket hits[kBlocks];
     // Places are joined as they are at one moment. Where only the camera moves they are the same at all, and
     // each block is seen at a moment of its own.
     std::optional<Eye> moved;
     if (view_.motion) moved.emplace(EyeAt(pixels.y0 + kTileEdge / 2, key, sample));
     const Eye& tile_eye = moved ? *moved : eye_;
+    const auto eye_of = [&](int block, std::optional<Eye>* own) -> const Eye& {
+      if (!view_.motion || scene_.wall->moves()) return tile_eye;
+      return own->emplace(EyeOf(pixels, block, sample));
+    };
     for (int block = 0; block < kBlocks; ++block) {
       tile.places[block].alive = LanesI{};
       tile.indirect[block] = Lanes3{};
       if constexpr (kCoat) tile.mirrored[block] = Lanes3{};
       if (!Any(pixels.on[block])) continue;
-      if (view_.motion && !scene_.wall->moves()) {
-        const Eye eye = EyeOf(pixels, block, sample);
-        TraceIndirectBlock(eye, pixels, block, sample, &tile, &glints, count);
-        if (glints) glints->Trace(eye, &count->rays);  // what moves has another eye in the next block
-      } else {
-        TraceIndirectBlock(tile_eye, pixels, block, sample, &tile, &glints, count);
-      }
+      std::optional<Eye> own;
+      tile.places[block] = Look(eye_of(block, &own), SamplesOf(pixels, block, sample), &hits[block], count);
     }
-    if (glints) glints->Trace(tile_eye, &count->rays);
+    // The coat mirrors its light where the pixels look, not where light enters the tissue.
+    if constexpr (kCoat) AddGlints(tile_eye, pixels, sample, &tile, count);
+    for (int block = 0; block < kBlocks; ++block) {
+      if (!Any(pixels.on[block]) || !(walks_ || options_.shared_paths == 0)) continue;
+      std::optional<Eye> own;
+      const Eye& eye = eye_of(block, &own);
+      const PixelSamples packet = SamplesOf(pixels, block, sample);
+      if (walks_) tile.places[block] = Entries(eye.time, hits[block], tile.places[block], packet, count);
+      if (options_.shared_paths == 0) AddOwnPaths(eye, packet, block, &tile, count);
+    }
     if (options_.shared_paths > 0) {
       const auto lost = [&](const auto& path) {
         Note({1, pixels.X(path.block, path.lane), pixels.Y(path.block, path.lane), sample}, &count->failure);
       };
       shared_paths_.Add(tile_eye, seed_, key, sample, &tile, &count->rays, lost);
     }
+    if constexpr (kCoat) {
+      if (photons) JoinPhotons(pixels, tile_number, sample, *photons, &tile, count);
+    }
     for (int block = 0; block < kBlocks; ++block) {
       Deposit(pixels, block, sample, tile.indirect[block], tile.mirrored[block], count);
     }
   }
 
-  void TraceIndirectBlock(const Eye& eye, const TilePixels& pixels, int block, int sample,
-                          TileSample<kCoat>* tile, std::optional<GlintPaths>* glints,
-                          PathCount* count) const {
-    HitPacket hits;
-    PixelSamples packet = SamplesOf(pixels, block, 1, 0);
-    packet.sample += static_cast<uint32_t>(sample);
-    tile->places[block] = Look(eye, packet, &hits, count);
-    // The coat mirrors its light where the pixels look, not where light enters the tissue.
-    if constexpr (kCoat) {
-      const auto sampler = [&](int i) {
-        return Sampler(seed_, packet.key[i], packet.sample[i], options_.sampler);
-      };
-      (*glints)->Start(eye, block, tile->places[block], sampler, &count->rays);
+  void AddGlints(const Eye& eye, const TilePixels& pixels, int sample, TileSample<true>* tile,
+                 PathCount* count) const {
+    const auto sampler_of = [&](int block, int i) {
+      return Sampler(seed_, PixelKey(pixels.X(block, i), pixels.Y(block, i)), static_cast<uint32_t>(sample),
+                     options_.sampler);
+    };
+    const auto lost = [&](const auto& path) {
+      Note({1, pixels.X(path.block, path.lane), pixels.Y(path.block, path.lane), sample}, &count->failure);
+    };
+    glint_paths_->Add(eye, *tile, sampler_of, walks_ ? tile->mirrored : tile->indirect, &count->rays, lost);
+  }
+
+  void JoinPhotons(const TilePixels& pixels, int tile_number, int sample, const PhotonsOfTiles& photons,
+                   TileSample<true>* tile, PathCount* count) const {
+    PhotonJoins joins(scene_, view_, eye_, pixels, tile);
+    for (int block = 0; block < kBlocks; ++block) {
+      if (!Any(tile->places[block].alive)) continue;
+      Lanes x, y;
+      Position(SamplesOf(pixels, block, sample), &x, &y);
+      joins.SetPositions(block, x, y);
     }
-    if (walks_) tile->places[block] = Entries(eye.time, hits, tile->places[block], packet, count);
-    if (options_.shared_paths == 0) AddOwnPaths(eye, packet, block, tile, count);
+    photons.ForEach(tile_number, [&](const Photon& photon) {
+      if (photon.source.power.allFinite()) {
+        joins.Add(photon, &count->rays);
+      } else {
+        Note({1, photon.x, photon.y, sample}, &count->failure);
+      }
+    });
   }
 
   // Adds a block's sample of indirect light to the frame's sums, but for pixels where it is not finite.
@@ -280,23 +303,18 @@ class Tracer {
     }
   }
 
-  // Adds what paths from the guides bring to the frame's sums. The mean over samples that AddIndirect takes
-  // leaves out those that were not finite, all of which these paths have.
-  void TraceFromGuides(PathCount* total) {
-    LightPaths(scene_, view_, options_, eye_, seed_, frame_)
-        .Trace(&total->rays, [&](int sample, int x, int y, const Vec3f& light) {
-          if (!light.allFinite()) {
-            Note({1, x, y, sample}, &total->failure);
-            return;
-          }
-          const size_t pixel = static_cast<size_t>(y) * view_.valid->width + x;
-          const double kept = lost_.empty() ? 1 : 1 - double(lost_[pixel]) / options_.samples;
-          for (int c = 0; c < 3; ++c) indirect_[3 * pixel + c] += kept * light[c];
-        });
+  static std::optional<GlintPaths> GlintPathsOf(const PathScene& scene, const PathOptions& options) {
+    if (!kCoat || options.bounces == 0) return std::nullopt;
+    return std::make_optional<GlintPaths>(scene, options, kGlintPairs);
+  }
+
+  std::optional<LightPaths> PathsFromGuides() const {
+    if (!kCoat || !LightPaths::Serve(scene_, view_, options_)) return std::nullopt;
+    return std::make_optional<LightPaths>(scene_, view_, options_, eye_, seed_, frame_);
   }
 
   // Of guides' light that the base of what is seen sends on, by paths from the camera.
-  GuideLobes LobesOfBase() const { return from_guides_ ? GuideLobes::kBase : GuideLobes::kAll; }
+  GuideLobes LobesOfBase() const { return light_paths_ ? GuideLobes::kBase : GuideLobes::kAll; }
 
   void AddIndirect(Film* film) const {
     ImageF& part = walks_ ? film->subsurface : film->indirect;
@@ -343,15 +361,28 @@ class Tracer {
         [&](const uint64_t* keys) { return SamplerLanes(seed_, keys, options_.sampler); });
   }
 
+  // Where in the image samples look, px.
+  void Position(const PixelSamples& packet, Lanes* x, Lanes* y) const {
+    *x = packet.x;
+    *y = packet.y;
+    if (direct_samples_ == 1) return;
+    Lanes u, v;
+    packet.sampler.Pair(packet.sample, kPixelPair, &u, &v);
+    *x += u - 0.5f;
+    *y += v - 0.5f;
+  }
+
+  // A sample of each of the pixels.
+  PixelSamples SamplesOf(const TilePixels& pixels, int block, int sample) const {
+    PixelSamples packet = SamplesOf(pixels, block, 1, 0);
+    packet.sample += static_cast<uint32_t>(sample);
+    return packet;
+  }
+
   // The places that are seen.
   PlacesOf<kCoat> Look(const Eye& eye, const PixelSamples& packet, HitPacket* hits, PathCount* count) const {
-    Lanes x = packet.x, y = packet.y;
-    if (direct_samples_ > 1) {
-      Lanes u, v;
-      packet.sampler.Pair(packet.sample, kPixelPair, &u, &v);
-      x += u - 0.5f;
-      y += v - 0.5f;
-    }
+    Lanes x, y;
+    Position(packet, &x, &y);
     Lanes3 in_camera;
     const LanesI seen = view_.camera->Unproject(x, y, &in_camera) & packet.on;
     RayPacket rays;
@@ -431,13 +462,13 @@ class Tracer {
   const PathOptions options_;
   const int direct_samples_;
   const uint64_t seed_, frame_;
-  const bool from_guides_;  // light that the coat mirrors onto other walls is traced from the guides
+  const bool pinhole_;
+  const Eye eye_;                                // at the frame's moment
+  const std::optional<LightPaths> light_paths_;  // that bring what the coat mirrors onto other walls
   const PlaceFinder<kCoat> finder_;
   const BouncePaths<kCoat> own_paths_;
   const SharedPaths<kCoat> shared_paths_;
-  const BouncePaths<kCoat> mirrored_paths_;  // that start at the coat of what is seen
-  const bool pinhole_;
-  const Eye eye_;  // at the frame's moment
+  const std::optional<GlintPaths> glint_paths_;
   std::optional<TissueWalks<kCoat>> walks_;
   std::vector<double> indirect_;  // sums over samples, RGB of each pixel
   std::vector<double> mirrored_;  // likewise off the coat, where there is tissue below; else in indirect_

@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "sim/imaging/bounce_paths.h"
-#include "sim/imaging/tile.h"
+#include "sim/imaging/tile_shadows.h"
 
 namespace lumen {
 
@@ -45,13 +45,14 @@ class SharedPaths {
            const OnLost& lost) const {
     const Places places(*tile);
     if (places.count == 0) return;
+    const TileShadows shadows(wall_, eye.time, *tile);
     const int packets = (count_ * paths_per_join_ + kLanes - 1) / kLanes;
     const Sampler tile_sampler(seed, key ^ kTileNumbers, static_cast<uint32_t>(sample), sampling_);
     std::vector<Packet> paths(static_cast<size_t>(packets));
     double whole = 0;
     for (int p = 0; p < packets; ++p) {
       Packet& path = paths[static_cast<size_t>(p)];
-      const BounceStart start = Start(places, *tile, seed, key, sample, p, packets, path.source);
+      const BounceStart start = Start(places, shadows, *tile, seed, key, sample, p, packets, path.source);
       path.ends = paths_.End(eye, start, kPairs, rays);
       paths_.AddRest(eye, start, kPairs, &path.ends, rays);
       path.brightness = Brightness(path.ends, start, *tile);
@@ -77,7 +78,7 @@ class SharedPaths {
         passed += chance;
         if (std::floor(passed) == before) continue;
         const double share = places.count / (double(packets) * kLanes * chance);
-        Join(eye.time, path.ends, i, path.source[i], static_cast<float>(share), places, tile, rays);
+        Join(path.ends, i, path.source[i], static_cast<float>(share), shadows, tile, rays);
       }
     }
   }
@@ -166,7 +167,6 @@ class SharedPaths {
   struct Places {
     explicit Places(const TileSample<kCoat>& tile) {
       for (int block = 0; block < kBlocks; ++block) {
-        origin[block] = OffsetOrigin(tile.places[block].point, tile.places[block].normal);
         for (int i = 0; i < kLanes; ++i) {
           if (tile.places[block].alive[i]) order[count++] = static_cast<int16_t>(block * kLanes + i);
         }
@@ -174,13 +174,13 @@ class SharedPaths {
     }
     int count = 0;
     std::array<int16_t, kBlocks * kLanes> order;
-    Lanes3 origin[kBlocks];
   };
 
   // A packet's starts. Its lanes lie a packet count apart in the order of all paths, each of which has a
   // share of the places for its own: together their densities are those of any path from any place.
-  BounceStart Start(const Places& places, const TileSample<kCoat>& tile, uint64_t seed, uint64_t key,
-                    int sample, int packet, int packets, int source[kLanes]) const {
+  BounceStart Start(const Places& places, const TileShadows& shadows, const TileSample<kCoat>& tile,
+                    uint64_t seed, uint64_t key, int sample, int packet, int packets,
+                    int source[kLanes]) const {
     BounceStart start;
     const int all = packets * kLanes;
     for (int i = 0; i < kLanes; ++i) {
@@ -192,14 +192,14 @@ class SharedPaths {
       const int block = source[i] / kLanes, lane = source[i] % kLanes;
       const auto& from = tile.places[block];
       start.on[i] = -1;
-      start.origin.Set(i, places.origin[block][lane]);
+      start.origin.Set(i, shadows.origins(block)[lane]);
       start.direction.Set(i, lambert::Sample(from.normal[lane], sampler.Pair(kPairs.Direction(1))));
       start.weight.Set(i, from.albedo[lane]);
     }
     return start;
   }
 
-  void Join(float time, const FarEnds<kCoat>& ends, int lane, int source, float share, const Places& places,
+  void Join(const FarEnds<kCoat>& ends, int lane, int source, float share, const TileShadows& shadows,
             TileSample<kCoat>* tile, int64_t* rays) const {
     const Lanes3 point = Broadcast(ends.places.point[lane]), normal = Broadcast(ends.places.normal[lane]);
     const Lanes3 from = OffsetOrigin(point, normal);
@@ -209,7 +209,7 @@ class SharedPaths {
       coupling[block] = Coupling(seen, point, normal);
       const LanesI faces = coupling[block] > 0.0f;
       if (!Any(faces)) continue;
-      LanesI visible = ~Hidden(time, from, places.origin[block], faces, rays);
+      LanesI visible = ~shadows.Hidden(from, block, faces, rays);
       // The path itself has shown that its start is seen.
       if (source / kLanes == block) visible[source % kLanes] = -1;
       coupling[block] = visible ? coupling[block] : Lanes{};
@@ -257,17 +257,6 @@ class SharedPaths {
 
   static void AddLight(int block, const LanesI& joined, const Lanes3& light, TileSample<kCoat>* tile) {
     tile->indirect[block] = tile->indirect[block] + Select(joined, light, Lanes3{});
-  }
-
-  LanesI Hidden(float time, const Lanes3& from, const Lanes3& to, const LanesI& asked, int64_t* rays) const {
-    RayPacket packet;
-    Store3(from, packet.origin);
-    Store3(to - from, packet.direction);
-    Store(Lanes{}, packet.tnear);
-    Store(asked ? Broadcast(1) : Broadcast(-1), packet.tfar);
-    packet.time = time;
-    *rays += Count(asked);
-    return wall_.Occluded(packet);
   }
 
   const RayScene& wall_;

@@ -16,6 +16,19 @@ inline constexpr int kBlockEdge = 4, kBlocksAcross = 4, kBlocks = kBlocksAcross 
 inline constexpr int kTileEdge = kBlockEdge * kBlocksAcross;
 static_assert(kBlockEdge * kBlockEdge == kLanes);
 
+// The tiles that cover a frame, in rows. The first may begin beyond its corner.
+struct TileGrid {
+  TileGrid(int width, int height, int shift_x, int shift_y)
+      : shift_x(shift_x),
+        shift_y(shift_y),
+        columns((width + shift_x + kTileEdge - 1) / kTileEdge),
+        rows((height + shift_y + kTileEdge - 1) / kTileEdge) {}
+
+  int shift_x, shift_y, columns, rows;
+
+  int Of(int x, int y) const { return (y + shift_y) / kTileEdge * columns + (x + shift_x) / kTileEdge; }
+};
+
 // One sample of each of a tile's pixels.
 template <bool kCoat>
 struct TileSample {
