@@ -239,9 +239,11 @@ double MegabytesOfTracing(const Arguments& arguments) {
   const double film = 3.0 * sizeof(float) * valid.width * valid.height / kBytesPerMegabyte;
   PathOptions options = subject.scene.path;
   options.samples = samples;
+  MovingWall walls(subject.scene.geometry, {std::nullopt, true});
+  walls.At(0);
   return MegabytesBeyondBefore([&] {
            for (int frame = 0; frame < frames; ++frame) {
-             FrameSetup(subject.scene, *subject.wall, frame, 0).Trace(options, 1);
+             FrameSetup(subject.scene, &walls, frame, 0).Trace(options, 1);
            }
          }) -
          film;
