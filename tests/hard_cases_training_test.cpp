@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <optional>
 
 #include "common/files.h"
 #include "common/image.h"
@@ -285,6 +286,103 @@ TEST(HardCasesTraining, CamerasOutsideTheTruthAreRefusedByCheck) {
 
 bool AllFinite(const LineVector<float>& values) {
   return std::all_of(values.begin(), values.end(), [](float value) { return std::isfinite(value); });
+}
+
+// Rays from the origin within 60° of +z, evenly over the sphere's part there.
+RayBatch<float> RaysAhead(int count) {
+  RayBatch<float> batch;
+  batch.rays.resize(count);
+  uint64_t state = 3;
+  for (auto& ray : batch.rays) {
+    const double z = 0.75 + 0.25 * Random(state), turn = kPi * Random(state), across = std::sqrt(1 - z * z);
+    ray.origin = Vec3f::Zero();
+    ray.direction = Vec3d(across * std::cos(turn), across * std::sin(turn), z).cast<float>();
+  }
+  return batch;
+}
+
+// A sphere around the origin in a box that ends 100 mm away: its field and rays from the origin.
+struct SphereSeen {
+  explicit SphereSeen(double radius_mm) {
+    options.initial.radius_mm = radius_mm;
+    options.initial.reach_mm = 0;
+    const InitialSurface initial(options.initial, {Pose::Identity()}, Vec3d::Zero());
+    field.emplace(options, initial, Eigen::AlignedBox3d{Vec3d::Constant(-100), Vec3d::Constant(100)});
+    parameters.resize(field->parameter_count());
+  }
+  WallSeen Look() {
+    RayBatch<float> rays = RaysAhead(400);
+    return LookAtWall(*field, parameters.data(), {}, &rays);
+  }
+  FieldOptions options;
+  std::optional<Field<float>> field;
+  std::vector<float> parameters;
+};
+
+// The box's nearest face, 100 mm straight ahead, cuts off a cap of a sphere of r within acos(100/r): of the
+// cone of 60° that is a share of 2 (1 − 100/r).
+TEST(HardCasesTraining, WhatRaysMeetIsMeasured) {
+  for (const double radius_mm : {20.0, 58.0, 70.0}) {
+    const WallSeen wall = SphereSeen(radius_mm).Look();
+    EXPECT_NEAR(wall.median_mm, radius_mm, 0.02);
+    EXPECT_EQ(wall.beyond, 0);
+  }
+  for (const double share : {0.05, 0.25}) {
+    // Four standard errors of a share among 400 rays.
+    EXPECT_NEAR(SphereSeen(100 / (1 - share / 2)).Look().beyond, share,
+                4 * std::sqrt(share * (1 - share) / 400));
+  }
+  EXPECT_NEAR(SphereSeen(300).Look().beyond, 1, 1e-9);
+}
+
+TEST(HardCasesTraining, ColourNetworksThatHaveDiedAreTold) {
+  SphereSeen sphere(20);
+  const Field<float>& field = *sphere.field;
+  field.Initialise(1, sphere.parameters.data());
+  EXPECT_FALSE(sphere.Look().one_color);
+  std::fill(sphere.parameters.begin() + static_cast<std::ptrdiff_t>(field.grid_size()),
+            sphere.parameters.end(), 0.0f);
+  std::fill_n(&sphere.parameters[field.color_bias_begin()], 3, -1.25f);
+  EXPECT_TRUE(sphere.Look().one_color);
+}
+
+// Runs that scenes unlike ours may make are let through; what measured failures looked like isn't.
+TEST(HardCasesTraining, WallsAreRefusedOnlyWhereNothingIsLeftOfThem) {
+  const WallSeen good{0, 35, false}, open_end{0.38, 80, false}, at_the_end{0.87, 90, false},
+      dead{0, 35, true}, lost{0.99, 122, true};
+  for (const WallSeen& wall : {good, open_end, at_the_end, dead}) EXPECT_EQ(WhyHopeless(wall), "");
+  EXPECT_EQ(WhyHopeless(lost), "99% of the pixels see no wall within the bounds");
+  EXPECT_EQ(WhyUseless(lost, 0), WhyHopeless(lost));
+  EXPECT_EQ(WhyUseless({0, 35, false}, 0.9) + WhyUseless(at_the_end, 0.9) + WhyUseless(dead, 0.07), "");
+  EXPECT_EQ(WhyUseless(dead, 0.15),
+            "the wall has one colour, whatever the frames show, and 15% of the photometric loss is left");
+
+  EXPECT_EQ(WhatIsOdd(good, 0.2), "");
+  EXPECT_EQ(WhatIsOdd({0.06, 58, false}, 0.2), "");
+  EXPECT_EQ(WhatIsOdd(at_the_end, 0.2), "87% of the pixels see no wall within the bounds");
+  EXPECT_EQ(WhatIsOdd(open_end, 0.2),
+            "half of the pixels see the wall more than 80 mm away: no colon is that wide");
+  EXPECT_EQ(WhatIsOdd(dead, 0.07), "the wall has one colour, whatever the frames show");
+  EXPECT_EQ(WhatIsOdd(good, 0.6), "training has learnt little: 60% of the photometric loss is left");
+}
+
+// Bounds that are nearer than the wall: the run ends in a line, and leaves neither mesh nor checkpoint.
+TEST(HardCasesTraining, ARunWhoseWallHasLeftTheBoundsStops) {
+  const ScratchFolder folder;
+  TrainRun run;
+  run.folder = folder / "run";
+  CreateFolder(run.folder);
+  WriteFile(run.folder / "mesh.ply", "an earlier run's");
+  const std::string error = test::ErrorOf([&] {
+    Train(SmallSequence(), ReadTrainOptions("fast", Settings({"bounds.ahead_mm=9", "bounds.aside_mm=9"})),
+          run);
+  });
+  EXPECT_NE(error.find("training fails: after 40 iterations "), std::string::npos) << error;
+  EXPECT_NE(error.find("no wall within the bounds; lower schedule.learning_rate"), std::string::npos)
+      << error;
+  EXPECT_EQ(error.find('\n'), std::string::npos);
+  EXPECT_FALSE(std::filesystem::exists(run.folder / "mesh.ply"));
+  EXPECT_FALSE(std::filesystem::exists(run.folder / "checkpoint"));
 }
 
 // Ten times too high: whatever comes of it is finite and closed, or a clear word. A thousand times: steps

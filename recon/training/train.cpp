@@ -15,6 +15,7 @@
 #include "common/mesh.h"
 #include "common/pose_file.h"
 #include "common/progress.h"
+#include "common/random.h"
 #include "recon/surface/extract.h"
 #include "recon/training/checkpoint.h"
 #include "recon/training/plausible.h"
@@ -32,10 +33,12 @@ constexpr double kReportSeconds = 1;
 constexpr int64_t kFewSteps = 100;
 constexpr double kTooManySkipped = 0.5;
 
-// Training takes the photometric loss to a fifth of its start within seconds. Where half is left, what was
-// learnt explains little: colours that are stuck, poses or a light that fit nothing.
-constexpr double kMuchLeft = 0.5;
 constexpr double kMeanOver = 0.98;  // what the running mean of the loss keeps from step to step
+
+// Every so many iterations the wall is looked at: a look costs as much as two. So many rays tell a share of
+// 95% to 1%, one of 40% to 2%.
+constexpr int64_t kLookEvery = 500;
+constexpr int kLookRays = 512;
 
 double SecondsSince(Clock::time_point start) {
   return std::chrono::duration<double>(Clock::now() - start).count();
@@ -69,8 +72,7 @@ class Run {
     RemoveAbandonedFiles(run_.folder);
     if (run_.resume) Resume();
     WriteFile(run_.folder / "config.toml", settings_);
-    // Another run's would be taken for this one's if this one is killed before it has any.
-    if (!run_.resume) RemoveCheckpoints(run_.folder / "checkpoint");
+    if (!run_.resume) RemoveEarlierRun();
     Optimise();
     if (saved_iteration_ != trainer_.state().iteration) Save();
     SayWhichCamerasAreOutside();
@@ -86,6 +88,12 @@ class Run {
 
  private:
   bool by_clock() const { return options_.schedule.seconds > 0; }
+
+  // Another run's would be taken for this one's if this one fails or is killed before it has any.
+  void RemoveEarlierRun() const {
+    RemoveCheckpoints(run_.folder / "checkpoint");
+    for (const char* name : {"mesh.ply", "pose.txt"}) std::filesystem::remove(run_.folder / name);
+  }
 
   void Resume() {
     const auto file = run_.folder / "checkpoint";
@@ -140,6 +148,7 @@ class Run {
       }
       skipped_in_a_row_ = step.skipped ? skipped_in_a_row_ + 1 : 0;
       if (state.iteration >= kFewSteps) CheckSkipped();
+      if (state.iteration % kLookEvery == 0) CheckHope();
       if (elapsed - last_report >= kReportSeconds && loss_weight > 0) {
         last_report = elapsed;
         Report(seconds_before + elapsed, step, loss / loss_weight);
@@ -153,7 +162,7 @@ class Run {
       }
     }
     CheckSkipped();
-    SayIfLittleLearnt();
+    CheckResult();
     result_.seconds = seconds_before + SecondsSince(start);
     result_.cpu_seconds = static_cast<double>(std::clock() - cpu_start) / CLOCKS_PER_SEC;
     result_.iterations = state.iteration;
@@ -194,13 +203,42 @@ class Run {
                      std::to_string(state.first_skipped_step) + "; lower schedule.learning_rate");
   }
 
-  void SayIfLittleLearnt() const {
+  // Rays that some of the frames' pixels see by, the same all along.
+  RayBatch<float> LookAround() const {
+    RayBatch<float> batch;
+    batch.rays.resize(kLookRays);
+    const uint64_t key = RandomBits(run_.seed, 0x6c6f6f6bull);
+    for (int r = 0; r < kLookRays; ++r) frames_.Draw(RandomBits(key, r), trainer_.origin(), &batch.rays[r]);
+    return batch;
+  }
+
+  WallSeen Look() {
+    RayBatch<float> rays = LookAround();
+    return LookAtWall(trainer_.field(), trainer_.Weights(), options_.sampling, &rays);
+  }
+
+  [[noreturn]] void Fail(const std::string& why) const {
+    throw InputError(fmt::format(
+        "{}: training fails: after {} iterations {}; lower schedule.learning_rate, or check poses, gains and "
+        "light",
+        run_.folder.string(), trainer_.state().iteration, why));
+  }
+
+  // Asked at iterations that don't depend on the clock.
+  void CheckHope() {
+    const std::string why = WhyHopeless(Look());
+    if (!why.empty()) Fail(why);
+  }
+
+  void CheckResult() {
+    const WallSeen wall = Look();
     const TrainState& state = trainer_.state();
-    if (state.iteration < kFewSteps || photometric_ < kMuchLeft * state.start_photometric) return;
-    Say(fmt::format(
-        "training has learnt little: the photometric loss is {:.3g}, and was {:.3g} at the start; lower "
-        "schedule.learning_rate, train longer, or check poses, gains and light",
-        photometric_, state.start_photometric));
+    const bool told = state.iteration >= kFewSteps && state.start_photometric > 0;
+    const double left = told ? photometric_ / state.start_photometric : 0;
+    const std::string why = WhyUseless(wall, left), odd = WhatIsOdd(wall, left);
+    if (!why.empty()) Fail(why);
+    if (!odd.empty())
+      Say(odd + "; lower schedule.learning_rate, train longer, or check poses, gains and light");
   }
 
   // What poses that are wrong, or a wall that was never seen, come to.

@@ -101,7 +101,7 @@ std::vector<std::string> MissingInBudget(const Scene& scene) {
   if (!has("coat")) missing.push_back("surface.coat={bounced_roughness = 0.6}");
   // μa of blood in the living colon (sim/imaging/subsurface.h).
   if (!has("subsurface")) missing.push_back("surface.subsurface={absorption_per_mm = [0.06, 1.1, 1.6]}");
-  if (!has("vignetting")) missing.push_back("response.vignetting=0.5");
+  if (!has("vignetting")) missing.push_back("response.vignetting=0.2");
   const Shutter shutter = scene.sensor.shutter.value_or(Shutter{0, 0});
   if (shutter.exposure == 0) missing.push_back("sensor.shutter.exposure=0.5");
   if (shutter.readout == 0) missing.push_back("sensor.shutter.readout=0.5");

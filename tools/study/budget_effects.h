@@ -33,9 +33,9 @@ struct BudgetEffect {
 
 // Settings that give a scene what it doesn't name of the effects that a budget is about, at the strength of a
 // colonoscope: eight bounces; three guides beside the camera, CF-H190L's, together as strong as the scene's
-// light; a coat of mucus (the default one, bounced_roughness 0.6); tissue with blood; vignetting k = 0.5; an
-// exposure of half the frame interval and as long a readout; the default sensor's noise. The rest a scene can
-// name too, and is then measured, but nobody else's.
+// light; a coat of mucus (the default one, bounced_roughness 0.6); tissue with blood; vignetting k = 0.2,
+// what a calibration may leave; an exposure of half the frame interval and as long a readout; the default
+// sensor's noise. The rest a scene can name too, and is then measured, but nobody else's.
 std::vector<std::string> MissingInBudget(const Scene& scene);
 
 // The paper's model has a texture and a gain a frame. The gain is automatic in all that the budget renders,
