@@ -44,10 +44,17 @@ struct SequenceFrame {
   std::filesystem::path color, depth, normals, flow, occlusion;
 };
 
+// Frames that are read at a part of their files' size (common/binning.h).
+struct Binning {
+  int factor = 1;             // so many by so many pixels of a file are one
+  int width = 0, height = 0;  // of the files, where that is more than 1
+};
+
 struct Sequence {
   std::filesystem::path folder;
   bool has_toml = false;  // false: a C3VD folder as it was downloaded
   Calibration calibration;
+  Binning binning;
   std::vector<SequenceFrame> frames;
   std::filesystem::path ground_truth_mesh;  // empty = none
   std::vector<std::string> left_out;        // what of the folder is not used, and why: a line each
@@ -92,7 +99,8 @@ std::vector<int> UniformFrames(int count, int at_most);
 // folder/0012_color.png.
 std::filesystem::path FrameFile(const std::filesystem::path& folder, int number, const std::string& suffix);
 
-// Colour of a frame, 8-bit RGB, checked against the camera's size. Throws DamagedFrame.
+// Colour of a frame, 8-bit RGB, checked against the camera's size, binned as the sequence says. Throws
+// DamagedFrame.
 Image8 ReadColor(const Sequence& sequence, const SequenceFrame& frame);
 
 // The same row by row, from the top: row(y, rgb). Throws DamagedFrame, maybe only after the last row.

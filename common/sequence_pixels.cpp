@@ -1,6 +1,7 @@
 // What of a sequence takes reading or looking at pixels.
 #include <algorithm>
 
+#include "common/binning.h"
 #include "common/error.h"
 #include "common/parallel.h"
 #include "common/sequence.h"
@@ -32,15 +33,19 @@ Image8 ReadColor(const Sequence& sequence, const SequenceFrame& frame) {
 void ReadColorRows(const Sequence& sequence, const SequenceFrame& frame,
                    const std::function<void(int, const uint8_t*)>& row) {
   const CameraIntrinsics& camera = sequence.calibration.camera;
+  const auto [factor, file_width, file_height] =
+      sequence.binning.factor > 1 ? sequence.binning : Binning{1, camera.width, camera.height};
   try {
     int width = 0, height = 0;
     ReadImageSize(frame.color, &width, &height);
-    if (width != camera.width || height != camera.height) {
+    if (width != file_width || height != file_height) {
       throw DamagedFrame(frame.color.string() + ": has " + std::to_string(width) + "×" +
-                         std::to_string(height) + " pixels, the camera " + std::to_string(camera.width) +
-                         "×" + std::to_string(camera.height));
+                         std::to_string(height) + " pixels, the camera " + std::to_string(file_width) + "×" +
+                         std::to_string(file_height));
     }
-    ReadImage8Rows(frame.color, 3, row);
+    if (factor == 1) return ReadImage8Rows(frame.color, 3, row);
+    RowBinner binner(sequence.calibration.response, factor, camera.width, row);
+    ReadImage8Rows(frame.color, 3, [&](int y, const uint8_t* rgb) { binner.AddRow(y, rgb); });
   } catch (const DamagedFrame&) {
     throw;
   } catch (const InputError& error) {

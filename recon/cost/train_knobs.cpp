@@ -114,6 +114,8 @@ std::vector<TrainKnob> TrainKnobsOf(const TrainOptions& own, int available_frame
     if (n <= available_frames) frames.push_back(n);
   knobs.push_back(NumberKnob("frames", own, frames, std::min(own.frames, available_frames),
                              [](double n, TrainOptions* o) { o->frames = static_cast<int>(n); }));
+  knobs.push_back(NumberKnob("binning", own, pick({1, 2}, {1, 2, 3, 4, 8}), own.binning,
+                             [](double n, TrainOptions* o) { o->binning = static_cast<int>(n); }));
   if (own.field.reflectance != Reflectance::kUnlit) knobs.push_back(ReflectanceKnob(own));
   if (own.field.reflectance == Reflectance::kLambertian) knobs.push_back(InterreflectionKnob(own));
   return knobs;

@@ -28,7 +28,7 @@ int64_t ResidentBytes() {
 
 TrainEstimate EstimateTraining(const Sequence& sequence, const TrainOptions& options,
                                const EstimateOptions& estimate) {
-  const TrainingFrames frames(sequence, options.frames, options.field.reflectance != Reflectance::kUnlit);
+  const TrainingFrames frames = FramesFor(sequence, options);
   Trainer trainer(frames, options, estimate.seed);
   TrainEstimate result;
   result.parameters = static_cast<int64_t>(trainer.state().parameters.size());

@@ -143,6 +143,7 @@ void ReadField(const ConfigTable& root, FieldOptions* field) {
 
 void ReadRest(const ConfigTable& root, TrainOptions* options) {
   options->frames = static_cast<int>(root.Integer("frames", options->frames, {1, 1e6}));
+  options->binning = static_cast<int>(root.Integer("binning", options->binning, {1, 1e6}));
   if (const auto bounds = root.Optional("bounds")) {
     options->bounds.ahead_mm = bounds->Number("ahead_mm", options->bounds.ahead_mm, kPositive);
     options->bounds.aside_mm = bounds->Number("aside_mm", options->bounds.aside_mm, kPositive);
@@ -256,7 +257,7 @@ TrainOptions ReadTrainOptions(const std::string& name, const std::vector<std::st
 std::string FormatTrainOptions(const TrainOptions& o) {
   std::ostringstream out;
   out.precision(17);
-  out << "preset = \"" << o.preset << "\"\nframes = " << o.frames
+  out << "preset = \"" << o.preset << "\"\nframes = " << o.frames << "\nbinning = " << o.binning
       << "\n\n[grid]\nlevels = " << o.field.grid.levels
       << "\ncoarsest_cell_mm = " << o.field.grid.coarsest_cell_mm
       << "\nfinest_cell_mm = " << o.field.grid.finest_cell_mm

@@ -22,6 +22,7 @@ enum class Decay {
 struct TrainOptions {
   std::string preset;
   int frames = 20;  // taken uniformly over the sequence
+  int binning = 1;  // so many by so many pixels of a frame as one (common/binning.h)
   FieldOptions field;
 
   struct Bounds {

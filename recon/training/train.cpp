@@ -63,7 +63,7 @@ class Run {
   Run(const Sequence& sequence, const TrainOptions& options, const TrainRun& run)
       : options_(ForFrames(options, std::min(options.frames, static_cast<int>(sequence.frames.size())))),
         run_(run),
-        frames_(sequence, options.frames, options.field.reflectance != Reflectance::kUnlit),
+        frames_(FramesFor(sequence, options)),
         trainer_(frames_, options_, run.seed),
         settings_("seed = " + std::to_string(run.seed) + "\n" + FormatTrainOptions(options_)) {}
 

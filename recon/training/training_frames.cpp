@@ -5,6 +5,7 @@
 #include <numeric>
 #include <optional>
 
+#include "common/binning.h"
 #include "common/error.h"
 #include "common/parallel.h"
 #include "common/random.h"
@@ -213,6 +214,13 @@ void TrainingFrames::Draw(uint64_t draw, const Vec3d& origin, RayBatch<float>::R
       ray->observed[c] = seen;
     }
   }
+}
+
+TrainingFrames FramesFor(const Sequence& sequence, const TrainOptions& options) {
+  const bool lit = options.field.reflectance != Reflectance::kUnlit;
+  // What isn't binned isn't copied: a mask may be large.
+  return options.binning == 1 ? TrainingFrames(sequence, options.frames, lit)
+                              : TrainingFrames(Binned(sequence, options.binning), options.frames, lit);
 }
 
 }  // namespace lumen

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/sequence.h"
+#include "recon/training/options.h"
 #include "recon/training/ray_loss.h"
 
 namespace lumen {
@@ -82,5 +83,8 @@ class TrainingFrames {
   double scale_ = 1;                         // 1/mm²: brings normalised pixels to a mean of one half
   float decoded_[256];
 };
+
+// The frames that a run with these options trains on.
+TrainingFrames FramesFor(const Sequence& sequence, const TrainOptions& options);
 
 }  // namespace lumen
