@@ -2,6 +2,8 @@
 // bound of rounding of what double gives. ε = 2⁻²⁴, a float's rounding.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "recon/network/grid.h"
@@ -44,6 +46,59 @@ TEST(HardCasesTraining, GridOfAMillionPlacesIsThatOfDouble) {
     reference.Encode(wide.data(), x_wide, &expected);
     for (int i = 0; i < single.outputs() * kTile; ++i)
       ASSERT_NEAR(found.Tile(0)[i], expected.Tile(0)[i], bound) << tile << " " << i;
+  }
+}
+
+// To eight bits of significand, to nearest, ties to even; below the normal numbers in steps of 2⁻¹³³.
+double NearestBfloat16(float value) {
+  int exponent;
+  std::frexp(value, &exponent);
+  const double step = std::ldexp(1.0, std::max(exponent - 8, -133));
+  return std::nearbyint(value / step) * step;
+}
+
+// What is looked up in packed tables is to the bit what a float grid finds in the nearest bfloat16s.
+TEST(HardCasesTraining, PackedTablesHoldTheNearestBfloat16s) {
+  GridOptions options;
+  options.levels = 3;
+  options.log2_table_size = 10;
+  const Eigen::AlignedBox3d box(Vec3d(-8, -8, -8), Vec3d(8, 8, 8));
+  const Grid<float> whole(options, box);
+  options.precision = TablePrecision::kBfloat16;
+  const Grid<float> half(options, box);
+  EXPECT_TRUE(half.packed());
+  EXPECT_FALSE(whole.packed() || Grid<double>(options, box).packed());
+  std::vector<float> table(whole.parameter_count()), nearest(table.size()), packed(table.size());
+  uint64_t state = 8;
+  for (size_t i = 0; i < table.size(); ++i) {
+    table[i] = static_cast<float>(Random(state) * std::pow(10, 5 * Random(state)));
+    if (i % 7 == 0) table[i] = std::ldexp(257.0f + 2 * (i % 3), -static_cast<int>(i % 80));  // halfway
+    if (i % 11 == 0) table[i] = std::ldexp(static_cast<float>(Random(state)), -128);
+    nearest[i] = static_cast<float>(NearestBfloat16(table[i]));
+  }
+  for (int level = 0; level < half.levels(); ++level) half.Pack(level, table.data(), packed.data());
+  Panel<float> x(3, 16), found(half.outputs(), 16), slopes(3 * half.outputs(), 16),
+      expected = found, expected_slopes = slopes, exact = found;
+  for (int tile = 0; tile < 16; ++tile)
+    for (int i = 0; i < 3 * kTile; ++i) x.Tile(tile)[i] = static_cast<float>(9 * Random(state));
+  const auto equal = [](const Panel<float>& a, const Panel<float>& b) {
+    return std::equal(a.Tile(0), a.Tile(a.tiles()), b.Tile(0));
+  };
+  half.Encode(packed.data(), x, &found);
+  whole.Encode(nearest.data(), x, &expected);
+  whole.Encode(table.data(), x, &exact);
+  EXPECT_TRUE(equal(found, expected));
+  EXPECT_FALSE(equal(found, exact));
+  half.EncodeWithJacobian(packed.data(), x, &found, &slopes);
+  whole.EncodeWithJacobian(nearest.data(), x, &expected, &expected_slopes);
+  EXPECT_TRUE(equal(found, expected) && equal(slopes, expected_slopes));
+
+  // What isn't finite isn't hidden, whatever its lower half.
+  for (const uint32_t bits : {0x7f800001u, 0x7fffffffu, 0xffffffffu, 0x7f800000u, 0xff800000u, 0x7f7fffffu}) {
+    std::fill(table.begin(), table.end(), std::bit_cast<float>(bits));
+    for (int level = 0; level < half.levels(); ++level) half.Pack(level, table.data(), packed.data());
+    half.Encode(packed.data(), x, &found);
+    for (int i = 0; i < kTile; ++i) ASSERT_FALSE(std::isfinite(found.Tile(0)[i])) << bits;
   }
 }
 

@@ -5,6 +5,8 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "common/error.h"
@@ -203,6 +205,37 @@ TEST(Checkpoint, DamageIsRefused) {
   EXPECT_THROW(ReadCheckpoint(folder / "checkpoint", "others", &back), InputError);
   back.first.resize(2);
   EXPECT_THROW(ReadCheckpoint(folder / "checkpoint", "settings", &back), InputError);
+}
+
+// Steps are those of the state, for any number of threads, and are taken by what is learnt in float: its
+// tables have more digits than what is looked up.
+TEST(Train, TablesInBfloat16AreLearntInFloat) {
+  const auto options = [](const std::string& precision) {
+    return ReadTrainOptions("fast", {"sampling.rays=64", "grid.precision=\"" + precision + "\""});
+  };
+  const TrainingFrames frames(test::SmallSequence(), 6, true);
+  Trainer whole(frames, options("float"), 5), through(frames, options("bf16"), 5),
+      first(frames, options("bf16"), 5), second(frames, options("bf16"), 5);
+  SetThreadCount(1);
+  for (int step = 0; step < 8; ++step) {
+    whole.Step(step / 10.0);
+    through.Step(step / 10.0);
+  }
+  SetThreadCount(2);
+  for (int step = 0; step < 3; ++step) first.Step(step / 10.0);
+  second.state() = first.state();
+  for (int step = 3; step < 8; ++step) second.Step(step / 10.0);
+  SetThreadCount(0);
+  EXPECT_EQ(through.state().parameters, second.state().parameters);
+  EXPECT_NE(through.state().parameters, whole.state().parameters);
+  const auto& learnt = through.state().parameters;
+  const size_t tables = through.field().grid_size();
+  const auto has_more_digits = [](float x) { return (std::bit_cast<uint32_t>(x) & 0xffff) != 0; };
+  EXPECT_GT(
+      std::count_if(learnt.begin(), learnt.begin() + static_cast<std::ptrdiff_t>(tables), has_more_digits),
+      static_cast<std::ptrdiff_t>(tables / 2));
+  EXPECT_TRUE(std::equal(learnt.begin() + static_cast<std::ptrdiff_t>(tables), learnt.end(),
+                         through.Weights() + tables));
 }
 
 // The fog's own sharpness at first, the schedule's from the fog's last step on; whichever of the two limits

@@ -61,26 +61,16 @@ TrainKnob SamplesKnob(const TrainOptions& own, const std::vector<double>& factor
   return NumberKnob("samples_a_ray", own, Around(per_ray, factors), per_ray, set);
 }
 
-TrainKnob InterreflectionKnob(const TrainOptions& own) {
-  TrainKnob knob{"interreflection", {}};
-  const std::pair<Interreflection, const char*> kinds[] = {{Interreflection::kNone, "none"},
-                                                           {Interreflection::kMean, "mean"},
-                                                           {Interreflection::kRadiosity, "radiosity"}};
-  for (const auto& [kind, label] : kinds) {
-    TrainKnobSetting setting{label, own, own.field.interreflection == kind};
-    setting.options.field.interreflection = kind;
-    knob.settings.push_back(setting);
-  }
-  return knob;
-}
-
-TrainKnob ReflectanceKnob(const TrainOptions& own) {
-  TrainKnob knob{"reflectance", {}};
-  const std::pair<Reflectance, const char*> kinds[] = {{Reflectance::kLambertian, "lambertian"},
-                                                       {Reflectance::kFree, "free"}};
-  for (const auto& [kind, label] : kinds) {
-    TrainKnobSetting setting{label, own, own.field.reflectance == kind};
-    setting.options.field.reflectance = kind;
+// A setting a value of an enumeration, by its names in order.
+template <class Enum>
+TrainKnob ChoiceKnob(const std::string& name, const TrainOptions& own, const std::vector<const char*>& labels,
+                     const std::function<Enum*(TrainOptions*)>& value) {
+  TrainKnob knob{name, {}};
+  for (size_t i = 0; i < labels.size(); ++i) {
+    TrainKnobSetting setting{labels[i], own, false};
+    Enum* chosen = value(&setting.options);
+    setting.is_own = *chosen == static_cast<Enum>(i);
+    *chosen = static_cast<Enum>(i);
     knob.settings.push_back(setting);
   }
   return knob;
@@ -107,6 +97,8 @@ std::vector<TrainKnob> TrainKnobsOf(const TrainOptions& own, int available_frame
     knobs.push_back(
         NumberKnob("grid_levels", own, pick({4}, {2, 4, 6, 10, 12}), grid.levels,
                    [](double n, TrainOptions* o) { o->field.grid.levels = static_cast<int>(n); }));
+    knobs.push_back(ChoiceKnob<TablePrecision>("precision", own, {"float", "bf16"},
+                                               [](TrainOptions* o) { return &o->field.grid.precision; }));
   }
   knobs.push_back(WidthKnob(own, pick({0.5, 2}, {0.25, 0.5, 2, 4})));
   std::vector<double> frames;
@@ -116,8 +108,14 @@ std::vector<TrainKnob> TrainKnobsOf(const TrainOptions& own, int available_frame
                              [](double n, TrainOptions* o) { o->frames = static_cast<int>(n); }));
   knobs.push_back(NumberKnob("binning", own, pick({1, 2}, {1, 2, 3, 4, 8}), own.binning,
                              [](double n, TrainOptions* o) { o->binning = static_cast<int>(n); }));
-  if (own.field.reflectance != Reflectance::kUnlit) knobs.push_back(ReflectanceKnob(own));
-  if (own.field.reflectance == Reflectance::kLambertian) knobs.push_back(InterreflectionKnob(own));
+  if (own.field.reflectance != Reflectance::kUnlit) {
+    knobs.push_back(ChoiceKnob<Reflectance>("reflectance", own, {"lambertian", "free"},
+                                            [](TrainOptions* o) { return &o->field.reflectance; }));
+  }
+  if (own.field.reflectance == Reflectance::kLambertian) {
+    knobs.push_back(ChoiceKnob<Interreflection>("interreflection", own, {"none", "mean", "radiosity"},
+                                                [](TrainOptions* o) { return &o->field.interreflection; }));
+  }
   return knobs;
 }
 

@@ -1,11 +1,25 @@
 #include "recon/network/grid.h"
 
+#include <algorithm>
+#include <bit>
 #include <cmath>
 #include <cstring>
+#include <type_traits>
 
 #include "common/random.h"
 
 namespace lumen {
+
+namespace {
+
+// NaN stays NaN, though its upper half alone might not be one.
+uint32_t Bfloat16Of(float value) {
+  const auto bits = std::bit_cast<uint32_t>(value);
+  const uint32_t rounded = (bits + 0x7fff + ((bits >> 16) & 1)) >> 16;
+  return value == value ? rounded : (bits >> 16) | 0x40;
+}
+
+}  // namespace
 
 template <class T>
 struct Grid<T>::Cell {
@@ -20,7 +34,8 @@ struct Grid<T>::Corners {
 };
 
 template <class T>
-Grid<T>::Grid(const GridOptions& options, const Eigen::AlignedBox3d& box) {
+Grid<T>::Grid(const GridOptions& options, const Eigen::AlignedBox3d& box)
+    : packed_(options.precision == TablePrecision::kBfloat16 && std::is_same_v<T, float>) {
   for (int d = 0; d < 3; ++d) low_[d] = static_cast<T>(box.min()[d]);
   const double ratio = options.levels > 1 ? std::pow(options.finest_cell_mm / options.coarsest_cell_mm,
                                                      1.0 / (options.levels - 1))
@@ -47,6 +62,22 @@ template <class T>
 void Grid<T>::Initialise(uint64_t seed, T* tables) const {
   for (size_t i = 0; i < parameter_count_; ++i) {
     tables[i] = static_cast<T>(1e-4 * (2 * UniformDouble(RandomBits(seed, i)) - 1));
+  }
+}
+
+template <class T>
+void Grid<T>::Pack(int level, const T* tables, T* packed) const {
+  const T* from = tables + levels_[level].offset;
+  char* to = reinterpret_cast<char*>(packed + levels_[level].offset);
+  const size_t count = levels_[level].entries;
+  uint32_t entries[kTile];
+  for (size_t begin = 0; begin < count; begin += kTile) {
+    const size_t some = std::min<size_t>(kTile, count - begin);
+    for (size_t i = 0; i < some; ++i) {
+      const T* entry = from + kFeatures * (begin + i);
+      entries[i] = Bfloat16Of(static_cast<float>(entry[0])) | Bfloat16Of(static_cast<float>(entry[1])) << 16;
+    }
+    std::memcpy(to + begin * sizeof(uint32_t), entries, some * sizeof(uint32_t));
   }
 }
 
@@ -90,13 +121,28 @@ void Grid<T>::Locate(const Level& level, const T* positions, Cell* cell) const {
 // An entry is moved as one: gather instructions fetch its numbers one by one, and are slow on processors that
 // guard them against speculation.
 template <class T>
-void Grid<T>::Fetch(const T* table, const Cell& cell, Corners* corners) {
+void Grid<T>::FetchWhole(const T* table, const Cell& cell, Corners* corners) {
   alignas(64) T entries[kTile * kFeatures];
   for (int c = 0; c < 8; ++c) {
     for (int s = 0; s < kTile; ++s)
       std::memcpy(&entries[kFeatures * s], table + kFeatures * cell.entry[c][s], kFeatures * sizeof(T));
     for (int s = 0; s < kTile; ++s)
       for (int f = 0; f < kFeatures; ++f) corners->value[f][c][s] = entries[kFeatures * s + f];
+  }
+}
+
+template <class T>
+void Grid<T>::FetchPacked(const T* table, const Cell& cell, Corners* corners) {
+  static_assert(kFeatures == 2);
+  alignas(64) uint32_t entries[kTile];
+  const char* bytes = reinterpret_cast<const char*>(table);
+  for (int c = 0; c < 8; ++c) {
+    for (int s = 0; s < kTile; ++s)
+      std::memcpy(&entries[s], bytes + sizeof(uint32_t) * cell.entry[c][s], sizeof(uint32_t));
+    for (int s = 0; s < kTile; ++s) {
+      corners->value[0][c][s] = std::bit_cast<float>(entries[s] << 16);
+      corners->value[1][c][s] = std::bit_cast<float>(entries[s] & 0xffff0000u);
+    }
   }
 }
 

@@ -11,11 +11,16 @@
 
 namespace lumen {
 
+// What the encoding reads the tables as. bfloat16 is a float's upper half, eight bits of significand: half
+// the memory to look up in. What is learnt stays float, for Adam's steps are smaller than a bfloat16's.
+enum class TablePrecision { kFloat, kBfloat16 };
+
 struct GridOptions {
   int levels = 8;
   double coarsest_cell_mm = 8.5;
   double finest_cell_mm = 0.53;
   int log2_table_size = 15;  // entries a level at most
+  TablePrecision precision = TablePrecision::kFloat;
 };
 
 template <class T>
@@ -34,6 +39,13 @@ class Grid {
   size_t level_size(int level) const { return levels_[level].entries * kFeatures; }
   // Uniform in ±1e-4, as Müller et al.
   void Initialise(uint64_t seed, T* tables) const;
+
+  // Whether Encode and EncodeWithJacobian read what Pack has made of the tables. A grid of doubles, which is
+  // for reference, never does.
+  bool packed() const { return packed_; }
+  // One level's numbers as bfloat16, to nearest, ties to even: an entry's two in 32 bits, the first in the
+  // lower half, from where the level begins. `packed` is as long as `tables`, and is half used.
+  void Pack(int level, const T* tables, T* packed) const;
 
   // positions: 3 rows, mm. Writes rows [0, outputs()) of `encoding`, which may have more.
   void Encode(const T* tables, const Panel<T>& positions, Panel<T>* encoding) const;
@@ -61,12 +73,17 @@ class Grid {
   struct Cell;  // where the samples of a tile lie in a level
   void Locate(const Level& level, const T* positions, Cell* cell) const;
   struct Corners;  // the numbers there
-  static void Fetch(const T* table, const Cell& cell, Corners* corners);
+  void Fetch(const T* table, const Cell& cell, Corners* corners) const {
+    packed_ ? FetchPacked(table, cell, corners) : FetchWhole(table, cell, corners);
+  }
+  static void FetchWhole(const T* table, const Cell& cell, Corners* corners);
+  static void FetchPacked(const T* table, const Cell& cell, Corners* corners);
   static void Scatter(const Corners& corners, const Cell& cell, int samples, T* table);
   template <bool kSecondOrder>
   void BackwardImpl(int level, const Panel<T>& positions, const Panel<T>& delta, const Panel<T>* pull,
                     const Panel<T>* direction, int count, T* gradient) const;
 
+  bool packed_;
   T low_[3];
   std::vector<Level> levels_;
   size_t parameter_count_ = 0;

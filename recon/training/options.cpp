@@ -87,6 +87,7 @@ const std::vector<std::string> kActivationNames = {"relu", "squareplus", "softpl
 const std::vector<std::string> kShapeNames = {"tube", "sphere"};
 const std::vector<std::string> kSamplerNames = {"guided", "importance"};
 const std::vector<std::string> kDecayNames = {"exponential", "cosine"};
+const std::vector<std::string> kPrecisionNames = {"float", "bf16"};
 const char* const kReflectanceNames[] = {"lambertian", "free", "unlit"};
 const char* const kInterreflectionNames[] = {"none", "mean", "radiosity"};
 
@@ -108,6 +109,7 @@ void ReadField(const ConfigTable& root, FieldOptions* field) {
     field->grid.finest_cell_mm = grid->Number("finest_cell_mm", field->grid.finest_cell_mm, {1e-3, 1e3});
     field->grid.log2_table_size =
         static_cast<int>(grid->Integer("log2_table_size", field->grid.log2_table_size, {4, 24}));
+    ReadChoice(*grid, "precision", kPrecisionNames, &field->grid.precision);
   }
   if (const auto network = root.Optional("network")) {
     field->sdf_hidden = Widths(*network, "sdf_hidden", field->sdf_hidden);
@@ -261,7 +263,8 @@ std::string FormatTrainOptions(const TrainOptions& o) {
       << "\n\n[grid]\nlevels = " << o.field.grid.levels
       << "\ncoarsest_cell_mm = " << o.field.grid.coarsest_cell_mm
       << "\nfinest_cell_mm = " << o.field.grid.finest_cell_mm
-      << "\nlog2_table_size = " << o.field.grid.log2_table_size
+      << "\nlog2_table_size = " << o.field.grid.log2_table_size << "\nprecision = \""
+      << kPrecisionNames[int(o.field.grid.precision)] << "\""
       << "\n\n[network]\nsdf_hidden = " << Array(o.field.sdf_hidden) << "\nsdf_activation = \""
       << kActivationNames[int(o.field.sdf_activation)] << "\"\nsdf_skip = " << o.field.sdf_skip
       << "\nweight_norm = " << (o.field.weight_norm ? "true" : "false")

@@ -129,9 +129,19 @@ void Trainer::MatchColorsToInitialSurface(const InitialSurface& initial) {
 }
 
 const float* Trainer::Weights() {
-  if (norm_.empty()) return state_.parameters.data();
+  const float* learnt = state_.parameters.data();
+  const Grid<float>& grid = field_->grid();
+  if (norm_.empty() && !grid.packed()) return learnt;
   weights_.resize(field_->parameter_count());
-  norm_.Expand(state_.parameters.data(), weights_.data());
+  if (norm_.empty()) {
+    std::copy_n(learnt + field_->grid_size(), field_->network_size(), &weights_[field_->grid_size()]);
+  } else {
+    norm_.Expand(learnt, weights_.data());
+  }
+  if (grid.packed()) {
+    ParallelFor(0, grid.levels(),
+                [&](int64_t level) { grid.Pack(static_cast<int>(level), learnt, weights_.data()); });
+  }
   return weights_.data();
 }
 

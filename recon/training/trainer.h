@@ -50,7 +50,7 @@ class Trainer {
   StepReport Step(double progress);
 
   const Field<float>& field() const { return *field_; }
-  // The field's parameters as they are now.
+  // The field's parameters as they are now, its tables as its grid reads them.
   const float* Weights();
   // Poses of the frames trained on, as they are refined so far.
   std::vector<Pose> Poses() const;
