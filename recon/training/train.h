@@ -34,7 +34,9 @@ struct TrainResult {
   int64_t skipped_steps = 0;
 };
 
-// Throws InputError: what the sequence or the folder is at fault for; a run without a surface at its end.
+// Throws InputError: what the sequence or the folder is at fault for; a run that fails or has no surface at
+// its end (recon/training/plausible.h), which leaves no mesh. An earlier run's mesh in the folder is removed
+// first, unless this one resumes it.
 TrainResult Train(const Sequence& sequence, const TrainOptions& options, const TrainRun& run);
 
 }  // namespace lumen
