@@ -1,0 +1,85 @@
+// What the pixels of a tile share of each other's paths (shared_paths.h, glint_paths.h, photon_joins.h) against
+// pixels that are alone in their tiles, which have only their own.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "sim/imaging/tile.h"
+#include "tests/path_stage.h"
+#include "tests/welch.h"
+
+namespace lumen {
+namespace {
+
+constexpr int kSeeds = 12, kAcross = 2, kDown = 2;
+
+// A camera and two guides off its axis in a globe with a sharp coat on a relief, by wide pixels.
+test::Stage GlintingGlobe(double ior) {
+  test::Stage stage(test::Globe(20, 40), test::CentredPinhole(kAcross * kTileEdge, kDown * kTileEdge, 12));
+  stage.surface.albedo = Vec3d(0.3, 0.15, 0.1);
+  stage.surface.coat.emplace(CoatOptions{ior, 0.4, 1, 0.06});
+  stage.light.sources.resize(2, stage.light.sources[0]);
+  stage.light.sources[0].position = Vec3d(3, 0.5, 0);
+  stage.light.sources[1].position = Vec3d(-2, -3, 0);
+  stage.world_from_camera.translation() = Vec3d(3, -2, 4);
+  stage.options.bounces = 2;
+  return stage;
+}
+
+// So far apart that wherever the grid of tiles lies, no two are in one.
+bool IsChosen(int x, int y) { return x % kTileEdge == 5 && y % kTileEdge == 9; }
+
+// The chosen pixels' green light between walls over seeds.
+struct Pixels {
+  double mean[kAcross * kDown] = {}, variance[kAcross * kDown] = {};  // of the mean
+};
+
+Pixels Measure(const test::Stage& stage, uint64_t first_seed) {
+  Pixels pixels;
+  double squares[kAcross * kDown] = {};
+  for (int seed = 0; seed < kSeeds; ++seed) {
+    const ImageF light = stage.Render(first_seed + seed, true).indirect;
+    for (int y = 0; y < light.height; ++y) {
+      for (int x = 0; x < light.width; ++x) {
+        if (!IsChosen(x, y)) continue;
+        const double value = light.Pixel(x, y)[1];
+        const int i = y / kTileEdge * kAcross + x / kTileEdge;
+        pixels.mean[i] += value / kSeeds;
+        squares[i] += value * value;
+      }
+    }
+  }
+  for (int i = 0; i < kAcross * kDown; ++i) {
+    pixels.variance[i] = (squares[i] - kSeeds * pixels.mean[i] * pixels.mean[i]) / (kSeeds * (kSeeds - 1.0));
+  }
+  return pixels;
+}
+
+double LeastChance(const Pixels& a, const Pixels& b) {
+  double least = 1;
+  for (int i = 0; i < kAcross * kDown; ++i) {
+    least = std::min(least, test::WelchChance(a.mean[i] - b.mean[i], a.variance[i], b.variance[i], kSeeds));
+  }
+  return least;
+}
+
+// Welch's test of each pixel, one false alarm in 1,000; a coat that reflects a fifth more is noticed.
+TEST(TileSharing, PixelsGetWhatTheyGetAlone) {
+  test::Stage alone = GlintingGlobe(1.8), together = GlintingGlobe(1.8), shinier = GlintingGlobe(1.91);
+  for (int y = 0; y < alone.valid.height; ++y) {
+    for (int x = 0; x < alone.valid.width; ++x) *alone.valid.Pixel(x, y) = IsChosen(x, y) ? 255 : 0;
+  }
+  alone.options.samples = 512;
+  together.options.samples = shinier.options.samples = 48;
+  const Pixels own = Measure(alone, 1), shared = Measure(together, 101), more = Measure(shinier, 101);
+  for (int i = 0; i < kAcross * kDown; ++i) {
+    std::printf("%g +- %g  %g +- %g  %g\n", own.mean[i], std::sqrt(own.variance[i]), shared.mean[i],
+                std::sqrt(shared.variance[i]), more.mean[i]);
+  }
+  const double bound = test::SharedOut(1e-3, kAcross * kDown);
+  EXPECT_GT(LeastChance(own, shared), bound);
+  EXPECT_LT(LeastChance(own, more), bound);
+}
+
+}  // namespace
+}  // namespace lumen
