@@ -119,7 +119,7 @@ bool LightBehindWall(const Light& light, const Pose& world_from_camera, const Ra
 }
 
 // A wall that moves while a frame is taken is asked at the steps between which it goes straight on, as the
-// camera does but for its turn at the frame's moment.
+// camera does; that may turn at the frame's moment, which is checked apart.
 void CheckWhileTaken(const Scene& scene, const MovingWall& walls, int frame,
                      const std::filesystem::path& file) {
   const double duration = scene.sensor.shutter->Duration();

@@ -39,7 +39,7 @@ struct Effect {
 
 const std::vector<Effect> kEffects = {
     {"chromatic_aberration", "lens.chromatic_aberration.red=0.01", {"chromatic_aberration"}},
-    {"coat", "surface.coat.roughness=0.2", {"coat", "glint_paths", "light_paths"}},
+    {"coat", "surface.coat.roughness=0.2", {"coat", "glint_paths", "light_paths", "photon", "photon_joins"}},
     {"defocus", "lens.defocus.aperture_mm=0.3", {"defocus"}},
     {"jpeg", "sensor.jpeg.quality=85", {"jpeg"}},
     {"noise", "sensor.noise.read_e=20", {"noise"}},

@@ -1,5 +1,6 @@
-// What the pixels of a tile share of each other's paths (shared_paths.h, glint_paths.h, photon_joins.h) against
-// pixels that are alone in their tiles, which have only their own.
+// What the pixels of a tile share of each other's paths (shared_paths.h, glint_paths.h, photon_joins.h)
+// against pixels that are alone in their tiles. Those are too narrow a view for light paths, too: all of
+// their light is found from the camera, each by paths of its own.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -72,10 +73,6 @@ TEST(TileSharing, PixelsGetWhatTheyGetAlone) {
   alone.options.samples = 512;
   together.options.samples = shinier.options.samples = 48;
   const Pixels own = Measure(alone, 1), shared = Measure(together, 101), more = Measure(shinier, 101);
-  for (int i = 0; i < kAcross * kDown; ++i) {
-    std::printf("%g +- %g  %g +- %g  %g\n", own.mean[i], std::sqrt(own.variance[i]), shared.mean[i],
-                std::sqrt(shared.variance[i]), more.mean[i]);
-  }
   const double bound = test::SharedOut(1e-3, kAcross * kDown);
   EXPECT_GT(LeastChance(own, shared), bound);
   EXPECT_LT(LeastChance(own, more), bound);

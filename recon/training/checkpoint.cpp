@@ -9,7 +9,7 @@
 namespace lumen {
 namespace {
 
-constexpr char kMagic[8] = {'l', 'u', 'm', 'e', 'n', 'c', 'k', '5'};
+constexpr char kMagic[8] = {'l', 'u', 'm', 'e', 'n', 'c', 'k', '6'};
 
 // FNV-1a, 64 bits (Fowler, Noll, Vo).
 uint64_t Checksum(std::string_view bytes) {
@@ -74,6 +74,7 @@ void Fields(Archive&& value, State& state) {
   value(state.iteration);
   value(state.seconds);
   value(state.start_photometric);
+  value(state.mean_photometric);
   value(state.skipped_steps);
   value(state.first_skipped_step);
   value(state.log_sharpness);

@@ -27,7 +27,7 @@ void CheckGains(const std::filesystem::path& folder, const std::vector<int>& num
 std::vector<size_t> PlacesOutside(const Field<float>& field, const float* parameters,
                                   const std::vector<Vec3d>& places);
 
-// The wall that is learnt, as rays that frames' pixels see by meet it.
+// The learnt wall, as the rays of frames' pixels meet it.
 struct WallSeen {
   double beyond = 0;  // share of the rays that meet none before the field's bounds, where nothing is learnt
   double median_mm = 0;  // distance

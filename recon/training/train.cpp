@@ -142,9 +142,9 @@ class Run {
       if (!step.skipped) {
         loss += step.loss.Sum();
         ++loss_weight;
-        if (state.start_photometric == 0) state.start_photometric = step.loss.photometric;
-        if (photometric_ < 0) photometric_ = step.loss.photometric;
-        photometric_ = kMeanOver * photometric_ + (1 - kMeanOver) * step.loss.photometric;
+        if (state.start_photometric == 0)
+          state.start_photometric = state.mean_photometric = step.loss.photometric;
+        state.mean_photometric = kMeanOver * state.mean_photometric + (1 - kMeanOver) * step.loss.photometric;
       }
       skipped_in_a_row_ = step.skipped ? skipped_in_a_row_ + 1 : 0;
       if (state.iteration >= kFewSteps) CheckSkipped();
@@ -234,7 +234,7 @@ class Run {
     const WallSeen wall = Look();
     const TrainState& state = trainer_.state();
     const bool told = state.iteration >= kFewSteps && state.start_photometric > 0;
-    const double left = told ? photometric_ / state.start_photometric : 0;
+    const double left = told ? state.mean_photometric / state.start_photometric : 0;
     const std::string why = WhyUseless(wall, left), odd = WhatIsOdd(wall, left);
     if (!why.empty()) Fail(why);
     if (!odd.empty())
@@ -279,7 +279,6 @@ class Run {
   int64_t saved_iteration_ = -1;
   size_t meshes_written_ = 0;
   int64_t skipped_in_a_row_ = 0;
-  double photometric_ = -1;  // running mean; none yet
   TrainResult result_;
 };
 

@@ -35,7 +35,7 @@ struct TrainResult {
 };
 
 // Throws InputError: what the sequence or the folder is at fault for; a run that fails or has no surface at
-// its end (recon/training/plausible.h), which leaves no mesh. An earlier run's mesh in the folder is removed
+// its end (recon/training/plausible.h), which leaves no mesh.ply. An earlier run's mesh in the folder is removed
 // first, unless this one resumes it.
 TrainResult Train(const Sequence& sequence, const TrainOptions& options, const TrainRun& run);
 

@@ -31,6 +31,7 @@ struct TrainState {
   // Where interreflection is by radiosity: a frame's DirectionMap after the other, as last computed.
   std::vector<float> surroundings;
   double start_photometric = 0;  // the first step's photometric loss, what training is measured by
+  double mean_photometric = 0;   // its running mean
   int64_t skipped_steps = 0;     // whose loss or gradient was not finite
   int64_t first_skipped_step = -1;
 };

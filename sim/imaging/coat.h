@@ -21,10 +21,10 @@
 //
 // With bounces, the light that a sharp lobe throws onto other walls is found by few paths from the camera,
 // which are bright: white dots until there are many samples. light_paths.h traces it from the guides and has
-// none, but not through a lens out of focus, a shutter or tissue. For those, bounced_roughness widens the
-// lobe for that light alone (Kaplanyan and Dachsbacher 2013, "Path space regularization"): it lands more
-// evenly than it would, and is less by what single scattering in the wider lobe loses. Without it the picture
-// is unbiased.
+// none, but not through a lens out of focus, a shutter or tissue, for a view below 0.25 sr or a single
+// sample. For those, bounced_roughness widens the lobe for that light alone (Kaplanyan and Dachsbacher 2013,
+// "Path space regularization"): it lands more evenly than it would, and is less by what single scattering in
+// the wider lobe loses. Without it the picture is unbiased.
 //
 // Energy: E(c) is what the first lobe sends back at the cosine c, Ē = 2 ∫ E(c) c dc its mean. The second has
 // what is left, shared out so that it stays reciprocal (Kelemen and Szirmay-Kalos 2001): with albedo 1 and no

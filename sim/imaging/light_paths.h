@@ -92,7 +92,7 @@ class LightPaths {
   // for each that the coat sends on all light of; least time to a given noise, of 0.15 to 4 and of 0.4 to 20.
   static constexpr double kPathsPerPixel = 0.5;
   static constexpr float kPathsOfWeight = 1;
-  // Of a sample at most. A tenth of them leave photons, of 160 bytes, or fewer.
+  // Of a sample. A tenth of them at most leave photons, of some 150 bytes each.
   static constexpr double kMostPaths = 2e6;
   // A part of all directions that is worth while: a fiftieth.
   static constexpr double kLeastView_sr = 0.25;

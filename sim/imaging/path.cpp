@@ -246,7 +246,8 @@ class Tracer {
       shared_paths_.Add(tile_eye, seed_, key, sample, &tile, &count->rays, lost);
     }
     if constexpr (kCoat) {
-      if (photons) JoinPhotons(pixels, tile_number, sample, *photons, &tile, count);
+      if (photons && photons->Has(tile_number))
+        JoinPhotons(pixels, tile_number, sample, *photons, &tile, count);
     }
     for (int block = 0; block < kBlocks; ++block) {
       Deposit(pixels, block, sample, tile.indirect[block], tile.mirrored[block], count);
@@ -284,7 +285,7 @@ class Tracer {
   }
 
   // Adds a block's sample of indirect light to the frame's sums, but for pixels where it is not finite.
-  // mirrored: if it is kept apart.
+  // mirrored: what the coat mirrors, if it is kept apart.
   void Deposit(const TilePixels& pixels, int block, int sample, const Lanes3& light, const Lanes3& mirrored,
                PathCount* count) {
     for (int i = 0; i < kLanes; ++i) {

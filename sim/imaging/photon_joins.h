@@ -14,6 +14,8 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "sim/imaging/eye.h"
@@ -36,6 +38,7 @@ class PhotonsOfTiles {
     }
   }
 
+  bool Has(int tile) const { return begin_[tile] < begin_[tile + 1]; }
   template <class Visit>
   void ForEach(int tile, const Visit& visit) const {
     for (uint32_t i = begin_[tile]; i < begin_[tile + 1]; ++i) visit(photons_[order_[i]]);
@@ -156,6 +159,8 @@ class PhotonJoins {
   float AreaPerPixel(const Vec2f& position, const Vec3f& point, const Vec3f& normal) const {
     const Vec3f from_eye = point - eye_.origin;
     const float squared = from_eye.squaredNorm(), cosine = -from_eye.dot(normal) / std::sqrt(squared);
+    // Rounding can turn a place that is seen edge-on away: no photon meets it.
+    if (!(cosine > 0)) return 0;
     return squared /
            (cosine * view_.camera->AreaPerSteradian(position, eye_.rotation.transpose() * from_eye));
   }

@@ -40,8 +40,8 @@ struct ColmapImage {
 struct ColmapPoint {
   Vec3d position = Vec3d::Zero();
   Rgb8 color = {};
-  double error_px =
-      0;  // mean over its observations: from there to where the model's camera sees the position
+  // Mean over its observations: from there to where the model's camera sees the position.
+  double error_px = 0;
 };
 
 struct ColmapModel {
@@ -74,7 +74,8 @@ CameraIntrinsics FromColmap(const ColmapCamera& camera);
 // COLMAP's for a pinhole or Kannala–Brandt camera: PINHOLE or OPENCV_FISHEYE.
 ColmapCamera ToColmap(const CameraIntrinsics& camera);
 
-// cameras.txt, images.txt and points3D.txt, every digit. A point's track are the images' observations of it.
+// cameras.txt, images.txt and points3D.txt, every digit. A point's track is made of the
+// images' observations of it; a point without any isn't written.
 void WriteColmapText(const ColmapModel& model, const std::filesystem::path& folder);
 
 }  // namespace lumen

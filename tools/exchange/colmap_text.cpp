@@ -29,6 +29,12 @@ int Size(LineReader* reader, std::string_view what) {
   return static_cast<int>(size);
 }
 
+uint8_t Channel(LineReader* reader) {
+  const int64_t value = reader->Integer("the colour");
+  if (value < 0 || value > 255) reader->Fail("the colour must lie within 0 and 255");
+  return static_cast<uint8_t>(value);
+}
+
 // The next line that isn't a comment; with `filled`, nor empty.
 bool NextElement(LineReader* reader, bool filled) {
   while (reader->NextLine()) {
@@ -109,7 +115,7 @@ void ReadPoints(const fs::path& file, ColmapModel* model) {
     const int64_t id = reader.Integer("the point's id");
     ColmapPoint point;
     for (int i = 0; i < 3; ++i) point.position[i] = reader.Number("the position");
-    for (uint8_t& channel : point.color) channel = static_cast<uint8_t>(reader.Integer("the colour"));
+    for (uint8_t& channel : point.color) channel = Channel(&reader);
     point.error_px = reader.Number("the error");
     model->points[static_cast<uint64_t>(id)] = point;
   }

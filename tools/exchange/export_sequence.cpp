@@ -114,7 +114,7 @@ ColmapModel WriteColmap(const Sequence& sequence, const ExportOptions& options, 
     image.camera_from_world = poses[i].inverse();
     model.images.push_back(image);
   }
-  if (sequence.ground_truth_mesh.empty()) {
+  if (options.points > 0 && sequence.ground_truth_mesh.empty()) {
     Say(sequence.folder.string() + ": no true wall is known: points3D.txt stays empty");
   } else if (options.points > 0) {
     // Images stay as they are but for rectified ones.

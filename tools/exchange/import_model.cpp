@@ -69,7 +69,7 @@ void SortByNumber(std::vector<ColmapImage>* images, std::vector<int>* numbers) {
 }
 
 // Whether `exported` is what an export writes in place of the calibration's camera; the fit, if so. Its
-// numbers are written with every digit; other programs may keep a few less.
+// numbers are written with every digit; other programs may keep a few fewer.
 std::optional<FisheyeFit> FitBehind(const CameraIntrinsics& exported, const Calibration& calibration) {
   const CameraIntrinsics& own = calibration.camera;
   if (own.model != CameraModel::kScaramuzza || exported.model != CameraModel::kKannalaBrandt ||

@@ -29,8 +29,8 @@ struct ImportOptions {
 struct ImportResult {
   int frames = 0;
   double mm_per_unit = 1;
-  std::optional<double>
-      turned_back_rad;  // about the axis, where the calibration's camera takes its place back
+  // By how much the poses were turned about the axis, where the calibration's camera was taken back.
+  std::optional<double> turned_back_rad;
   std::optional<SimilarityFit> from_poses;
   std::optional<LightScale> from_light;
 };
