@@ -57,6 +57,7 @@ round_sharpness_per_mm = 0.9412
 weight_threshold = 0.0
 [loss]
 eikonal = 0.1
+free_space = 0.0
 [schedule]
 iterations = 300000
 learning_rate = 5e-4
@@ -174,6 +175,8 @@ void ReadRest(const ConfigTable& root, TrainOptions* options) {
     // Its end keeps every trust above 1e-6: their sum stays a number.
     l.ambient_doubt = loss->Number("ambient_doubt", l.ambient_doubt, {0, 1e6});
     l.albedo_width = loss->Number("albedo_width", l.albedo_width, kPositive);
+    l.free_space = loss->Number("free_space", l.free_space, kNotNegative);
+    l.clearance_mm = loss->Number("clearance_mm", l.clearance_mm, kNotNegative);
   }
   if (const auto schedule = root.Optional("schedule")) {
     auto& s = options->schedule;
@@ -288,7 +291,8 @@ std::string FormatTrainOptions(const TrainOptions& o) {
       << "\nweight_threshold = " << o.sampling.weight_threshold << "\n\n[loss]\neikonal = " << o.loss.eikonal
       << "\nalbedo = " << o.loss.albedo << "\nalbedo_final = " << o.loss.albedo_final
       << "\nambient = " << o.loss.ambient << "\nambient_doubt = " << o.loss.ambient_doubt
-      << "\nalbedo_width = " << o.loss.albedo_width
+      << "\nalbedo_width = " << o.loss.albedo_width << "\nfree_space = " << o.loss.free_space
+      << "\nclearance_mm = " << o.loss.clearance_mm
       << "\n\n[schedule]\niterations = " << o.schedule.iterations << "\nseconds = " << o.schedule.seconds
       << "\nlearning_rate = " << o.schedule.learning_rate
       << "\nlearning_rate_final = " << o.schedule.learning_rate_final << "\ndecay = \""

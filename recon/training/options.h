@@ -56,6 +56,8 @@ struct TrainOptions {
     double albedo_width = 0.3;   // of this Huber loss and that of `ambient`
     double ambient = 3;          // the same pull on the log ambient factor, all the time
     double ambient_doubt = 200;  // of ChannelTrust, recon/training/loss.h
+    double free_space = 1;       // a mm that a camera lacks of this clearance: recon/training/free_space.h
+    double clearance_mm = 0.5;
   } loss;
 
   struct Schedule {

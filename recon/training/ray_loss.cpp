@@ -17,6 +17,7 @@ LossTerms& LossTerms::operator+=(const LossTerms& other) {
   eikonal += other.eikonal;
   albedo += other.albedo;
   ambient += other.ambient;
+  free_space += other.free_space;
   by_log_sharpness += other.by_log_sharpness;
   active_samples += other.active_samples;
   return *this;

@@ -52,16 +52,17 @@ struct LossSettings {
   T per_ray;  // 1/number of rays of the whole step
 };
 
-// Sums over a batch; the first four are the parts of the step's loss.
+// Sums over a batch; the first five are the parts of the step's loss.
 struct LossTerms {
   double photometric = 0;
   double eikonal = 0;
   double albedo = 0;
   double ambient = 0;
+  double free_space = 0;        // of the cameras, not of rays: recon/training/free_space.h
   double by_log_sharpness = 0;  // ∂loss/∂log s
   int64_t active_samples = 0;
 
-  double Sum() const { return photometric + eikonal + albedo + ambient; }
+  double Sum() const { return photometric + eikonal + albedo + ambient + free_space; }
   LossTerms& operator+=(const LossTerms& other);
 };
 

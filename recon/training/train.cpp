@@ -262,6 +262,7 @@ class Run {
                                          {"eikonal", step.loss.eikonal},
                                          {"albedo", step.loss.albedo},
                                          {"ambient", step.loss.ambient},
+                                         {"free_space", step.loss.free_space},
                                          {"s_per_mm", step.sharpness_per_mm},
                                          {"active_samples", step.loss.active_samples},
                                          {"skipped_steps", state.skipped_steps},

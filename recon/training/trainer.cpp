@@ -21,6 +21,8 @@ constexpr int kPieceRays = 4;
 
 constexpr int64_t kSurroundingsEvery = 250;  // iterations
 
+constexpr size_t kCamerasAStep = 2 * kTile;  // that are kept in the lumen
+
 constexpr double kLongestFog = 0.2;  // as a part of the run: a short one, too, is to end with a wall
 
 double LogInterpolate(double from, double to, double at) { return from * std::pow(to / from, at); }
@@ -68,6 +70,7 @@ Trainer::Trainer(const TrainingFrames& frames, const TrainOptions& options, uint
     if (options.poses.refine) chunk.pose_gradient.assign(size_t(frames.size()) * kPoseNumbers, 0.0f);
     chunks_.push_back(std::move(chunk));
   }
+  free_space_ = std::make_unique<FreeSpace<float>>(field_.get());
   norm_ = field_->Normalisation();
   const size_t count = field_->parameter_count() + norm_.lengths();
   state_.parameters.resize(count);
@@ -235,6 +238,19 @@ void Trainer::RunChunk(int index, const float* weights, const LossSettings<float
   LeaveWorkspace(std::move(workspace), &chunk);
 }
 
+// Adds to the first chunk's gradient. Of many cameras so many take their turn.
+double Trainer::KeepCamerasFree(const float* weights) {
+  if (options_.loss.free_space == 0) return 0;
+  const size_t all = lights_.size(), some = std::min(all, kCamerasAStep);
+  camera_places_.resize(some);
+  for (size_t i = 0; i < some; ++i) {
+    camera_places_[i] = lights_[(static_cast<size_t>(state_.iteration) * some + i) % all].camera;
+  }
+  return free_space_->Evaluate(weights, camera_places_, static_cast<float>(options_.loss.clearance_mm),
+                               static_cast<float>(options_.loss.free_space),
+                               chunks_.front().network_gradient.data());
+}
+
 bool Trainer::GradientsAreFinite() const {
   return std::all_of(chunks_.begin(), chunks_.end(), [](const Chunk& chunk) { return chunk.finite; });
 }
@@ -348,6 +364,7 @@ StepReport Trainer::Step(double progress) {
   ParallelFor(0, static_cast<int64_t>(chunks_.size()),
               [&](int64_t i) { RunChunk(static_cast<int>(i), weights, settings); });
   for (const Chunk& chunk : chunks_) report.loss += chunk.terms;
+  report.loss.free_space = KeepCamerasFree(weights);
   ++state_.iteration;
   if (!GradientsAreFinite()) {
     report.skipped = true;
@@ -363,6 +380,7 @@ StepReport Trainer::Step(double progress) {
     // From the finest level on, which has the most to do.
     const int level = levels - 1 - static_cast<int>(task);
     for (Chunk& chunk : chunks_) chunk.workspace->loss.GridBackward(level, gradient_.data());
+    free_space_->GridBackward(level, gradient_.data());
     const size_t begin = field_->grid().level_begin(level);
     AdamUpdate(step, field_->grid().level_size(level), &state_.parameters[begin], &gradient_[begin],
                &state_.first[begin], &state_.second[begin]);

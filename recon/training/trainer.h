@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "recon/network/adam.h"
+#include "recon/training/free_space.h"
 #include "recon/training/options.h"
 #include "recon/training/pose_refinement.h"
 #include "recon/training/ray_loss.h"
@@ -91,6 +92,7 @@ class Trainer {
   bool GradientsAreFinite() const;
   bool has_surroundings() const;
   void UpdateSurroundings();
+  double KeepCamerasFree(const float* weights);
   void UpdateNetworks(const AdamStep& step);
   void UpdateGains(const AdamStep& step);
   bool refines_poses() const { return state_.poses.frames() > 0; }
@@ -108,6 +110,8 @@ class Trainer {
   WeightNorm<float> norm_;
   LineVector<float> weights_;  // the field's parameters, where they aren't what is learnt
   std::vector<Chunk> chunks_;
+  std::unique_ptr<FreeSpace<float>> free_space_;
+  std::vector<Vec3f> camera_places_;  // that it looks at
   std::mutex idle_mutex_;
   std::vector<std::unique_ptr<Workspace>> idle_;
   LineVector<float> gradient_;
