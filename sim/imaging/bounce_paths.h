@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <type_traits>
 
 #include "common/lanes.h"
 #include "common/ray_scene.h"
+#include "sim/imaging/far_ends.h"
 #include "sim/imaging/guide_light.h"
 #include "sim/imaging/path.h"
 #include "sim/imaging/places.h"
@@ -23,6 +25,8 @@ class BouncePairs {
   constexpr uint32_t Direction(int bounce) const { return Of(bounce, 0); }
   constexpr uint32_t Roulette(int bounce) const { return Of(bounce, 1); }
   constexpr uint32_t Guide(int bounce) const { return Of(bounce, 2); }
+  // The first of a walk's two. Chains count from 1 on.
+  constexpr uint32_t Walk(int bounce) const { return WalkPair(bounce) + (first_ - 1); }
 
  private:
   constexpr uint32_t Of(int bounce, uint32_t use) const {
@@ -39,94 +43,30 @@ struct BounceStart {
   std::optional<Sampler> samplers[kLanes];
 };
 
-// Where they end on the wall, and the light that is sent from there.
-template <bool kCoat>
-struct FarEnds;
-
-template <>
-struct FarEnds<false> {
-  Places places;
-  Places entries;   // where light comes in that leaves the places; set only where there is tissue
-  Lanes3 radiance;  // to all sides
-
-  // One lane's in all lanes.
-  FarEnds Lane(int i) const {
-    FarEnds lane;
-    lane.radiance = Broadcast(radiance[i]);
-    return lane;
-  }
-  Lanes3 RadianceTo(const Lanes3&) const { return radiance; }
-};
-
-template <>
-struct FarEnds<true> {
-  CoatedPlaces places;
-  struct Arrival {
-    Lanes3 toward;  // unit, from the place
-    Lanes3 light;   // irradiance of a facing patch
-  };
-  Arrival from_guide;
-  GuideLobes guide_lobes;  // that it goes through
-  Arrival from_walls;  // along the path, whose direction was chosen with the coat's density (Coat::Pdf) for
-                       // light that leaves for where the path came from: not over that density
-
-  FarEnds Lane(int i) const {
-    FarEnds lane;
-    lane.places.normal = Broadcast(places.normal[i]);
-    lane.places.albedo = Broadcast(places.albedo[i]);
-    lane.places.coat_normal = Broadcast(places.coat_normal[i]);
-    lane.places.coat = places.coat;
-    const auto all = [&](const Arrival& arrival) {
-      return Arrival{Broadcast(arrival.toward[i]), Broadcast(arrival.light[i])};
-    };
-    lane.from_guide = all(from_guide);
-    lane.guide_lobes = guide_lobes;
-    lane.from_walls = all(from_walls);
-    return lane;
-  }
-
-  // What is sent towards unit directions above the wall, and the density with which a path from there would
-  // have gone on as this one did, 1/sr.
-  struct Sent {
-    Lanes3 of_guide, of_walls;
-    Lanes density;
-  };
-  Sent To(const Lanes3& direction) const {
-    CoatedLanes seen{places.normal, places.albedo, direction, places.coat_normal, {}};
-    seen.reflectance = places.coat->Reflectance(Dot(seen.coat_normal, direction));
-    const Coat& coat = *places.coat;
-    return {from_guide.light * (guide_lobes == GuideLobes::kBase ? coat.EvalBase(seen, from_guide.toward)
-                                                                 : coat.EvalBoth(seen, from_guide.toward)),
-            from_walls.light * coat.EvalBoth(seen, from_walls.toward), coat.Pdf(seen, from_walls.toward)};
-  }
-
-  // Towards where the paths came from.
-  Lanes3 RadianceTo(const Lanes3& direction) const {
-    const Sent sent = To(direction);
-    return sent.of_guide + Select(sent.density > 0.0f, sent.of_walls * (1.0f / sent.density), Lanes3{});
-  }
-};
-
-template <bool kCoat>
+// The coat and tissue make a difference inside the loops and are template parameters.
+template <bool kCoat, bool kTissue>
 class BouncePaths {
  public:
+  using Ends = FarEnds<kCoat, kTissue>;
+
+  // guide_lobes: all, where there is tissue.
   BouncePaths(const PathScene& scene, const PathOptions& options, GuideLobes guide_lobes)
       : wall_(*scene.wall), options_(options), guide_lobes_(guide_lobes), finder_(scene) {
-    if (scene.surface->subsurface) walks_.emplace(scene);
+    if constexpr (kTissue) walks_.emplace(scene);
   }
 
   // Where the rays end and what of the guides' light is sent from there. Rays are counted.
-  FarEnds<kCoat> End(const Eye& eye, const BounceStart& start, BouncePairs pairs, int64_t* rays) const {
-    FarEnds<kCoat> ends;
-    HitPacket hits;
-    ends.places = Meet(eye.time, start.on, start.origin, start.direction, &hits, rays);
-    if constexpr (!kCoat) {
-      if (walks_) ends.entries = Entries(eye.time, hits, ends.places, 1, start, rays);
-    }
-    const PlacesOf<kCoat>& lit = Lit(ends);
-    const ChosenLight light = LightFromOneGuide<kCoat>(wall_, eye, lit, guide_lobes_,
-                                                       Numbers(start, lit.alive, pairs.Guide(1)), rays);
-    if constexpr (kCoat) {
+  Ends End(const Eye& eye, const BounceStart& start, BouncePairs pairs, int64_t* rays) const {
+    Ends ends;
+    static_cast<Stop&>(ends) =
+        StopAt(eye.time, start.on, start.origin, start.direction, start, pairs.Walk(1), rays);
+    const GuideLight light = LightOfGuides(eye, ends, start, pairs.Guide(1), rays);
+    if constexpr (kCoat && kTissue) {
+      ends.base_from_guide = {light.toward, light.irradiance};
+      ends.glint_from_guide = {light.glint.toward, light.glint.irradiance};
+      ends.from_walls = {light.toward, Lanes3{}};
+      ends.by_glint = LanesI{};
+    } else if constexpr (kCoat) {
       ends.guide_lobes = guide_lobes_;
       ends.from_guide = {light.toward, light.irradiance};
       ends.from_walls = {light.toward, Lanes3{}};
@@ -137,29 +77,25 @@ class BouncePaths {
   }
 
   // Adds the light that comes to the ends from other walls.
-  void AddRest(const Eye& eye, const BounceStart& start, BouncePairs pairs, FarEnds<kCoat>* ends,
-               int64_t* rays) const {
-    PlacesOf<kCoat> places = Lit(*ends);
+  void AddRest(const Eye& eye, const BounceStart& start, BouncePairs pairs, Ends* ends, int64_t* rays) const {
+    Stop stop = *ends;
     Lanes3 throughput = Broadcast(Vec3f(1, 1, 1)), weight = start.weight, incoming{};
-    for (int bounce = 2; bounce <= options_.bounces && Any(places.alive); ++bounce) {
-      const Lanes3 direction = NextDirections(start, pairs, bounce, &places, &throughput, &weight);
+    for (int bounce = 2; bounce <= options_.bounces && Any(stop.places.alive); ++bounce) {
+      const Leaving leaving = GoOn(start, pairs, bounce, stop, &throughput, &weight);
       if constexpr (kCoat) {
-        if (bounce == 2) ends->from_walls.toward = direction;
+        if (bounce == 2) ends->from_walls.toward = leaving.direction;
+        if constexpr (kTissue) {
+          if (bounce == 2) ends->by_glint = leaving.by_glint;
+        }
       }
-      HitPacket hits;
-      places =
-          Meet(eye.time, places.alive, OffsetOrigin(places.point, places.normal), direction, &hits, rays);
-      if constexpr (!kCoat) {
-        if (walks_) places = Entries(eye.time, hits, places, bounce, start, rays);
-      }
-      const ChosenLight light = LightFromOneGuide<kCoat>(
-          wall_, eye, places, guide_lobes_, Numbers(start, places.alive, pairs.Guide(bounce)), rays);
-      incoming = incoming + Select(places.alive, throughput * light.sent, Lanes3{});
+      stop = StopAt(eye.time, leaving.on, leaving.origin, leaving.direction, start, pairs.Walk(bounce), rays);
+      const GuideLight light = LightOfGuides(eye, stop, start, pairs.Guide(bounce), rays);
+      incoming = incoming + Select(stop.places.alive, throughput * light.Whole(), Lanes3{});
     }
     if constexpr (kCoat) {
       ends->from_walls.light = incoming;
     } else {
-      ends->radiance = ends->radiance + Lit(*ends).albedo * incoming;
+      ends->radiance = ends->radiance + ends->lit().albedo * incoming;
     }
   }
 
@@ -182,69 +118,133 @@ class BouncePaths {
       hits->u[i] = hit.u;
       hits->v[i] = hit.v;
     }
-    PlacesOf<kCoat> places = finder_.Find(packet, *hits, true);
-    if (kCoat && walks_) places.albedo = walks_->EvenAlbedo(places.albedo);
-    return places;
+    return finder_.Find(packet, *hits, true);
   }
 
  private:
-  // Where paths go on to from places; those that the roulette ends are no longer alive. throughput: what
-  // share of the light that comes along them reaches the ends, without the ends' own lobe and, with a coat,
-  // the density of the direction there; weight: of what is seen.
-  Lanes3 NextDirections(const BounceStart& start, BouncePairs pairs, int bounce, PlacesOf<kCoat>* places,
-                        Lanes3* throughput, Lanes3* weight) const {
-    Lanes3 direction{};
+  using Stop = PathPlaces<kCoat, kTissue>;
+
+  Stop StopAt(float time, const LanesI& on, const Lanes3& origin, const Lanes3& direction,
+              const BounceStart& start, uint32_t walk_pair, int64_t* rays) const {
+    Stop stop;
+    HitPacket hits;
+    stop.places = Meet(time, on, origin, direction, &hits, rays);
+    if constexpr (kTissue) {
+      stop.entries = walks_->Entries(
+          time, hits, stop.places, walk_pair, true, [&](int i) { return *start.samplers[i]; }, rays);
+    }
+    // A lobe is chosen as on an even wall, whether the walk got lost or not; but what carries much is
+    // followed the more often, and whatever carries something may be.
+    if constexpr (kCoat && kTissue) {
+      stop.places.albedo = Max(walks_->EvenAlbedo(stop.places.albedo), stop.entries.albedo);
+    }
+    return stop;
+  }
+
+  // Of one of the guides in each lane; in tissue below a coat, one for each lobe.
+  struct OneLobeOfGuide : ChosenLight {
+    Lanes3 Whole() const { return sent; }
+  };
+  struct BothLobesOfGuide : ChosenLight {
+    ChosenLight glint;
+    Lanes3 Whole() const { return sent + glint.sent; }
+  };
+  using GuideLight = std::conditional_t<kCoat && kTissue, BothLobesOfGuide, OneLobeOfGuide>;
+
+  GuideLight LightOfGuides(const Eye& eye, const Stop& stop, const BounceStart& start, uint32_t pair,
+                           int64_t* rays) const {
+    const auto from_one = [&](const PlacesOf<kCoat>& places, GuideLobes lobes, int number) {
+      return LightFromOneGuide<kCoat>(wall_, eye, places, lobes, Numbers(start, places.alive, pair, number),
+                                      rays);
+    };
+    if constexpr (kCoat && kTissue) {
+      return {from_one(stop.entries, GuideLobes::kBase, 0), from_one(stop.places, GuideLobes::kGlint, 1)};
+    } else {
+      return {from_one(stop.lit(), guide_lobes_, 0)};
+    }
+  }
+
+  static Lanes Numbers(const BounceStart& start, const LanesI& alive, uint32_t pair, int number) {
+    Lanes numbers{};
     for (int i = 0; i < kLanes; ++i) {
-      if (!places->alive[i]) continue;
+      if (alive[i]) numbers[i] = start.samplers[i]->Pair(pair)[number];
+    }
+    return numbers;
+  }
+
+  // Rays on which paths go on from a stop.
+  struct Leaving {
+    LanesI on;
+    Lanes3 origin, direction;
+    LanesI by_glint;  // −1: from the places, by the coat's first lobe; set only in tissue below a coat
+  };
+
+  // The roulette ends some paths. throughput: what share of the light that comes along them reaches the ends,
+  // without the ends' own lobe and, with a coat, the density of the direction there; weight: of what is seen.
+  Leaving GoOn(const BounceStart& start, BouncePairs pairs, int bounce, const Stop& stop, Lanes3* throughput,
+               Lanes3* weight) const {
+    const PlacesOf<kCoat>& lit = stop.lit();
+    Leaving leaving{kCoat ? stop.places.alive : lit.alive, {}, {}, {}};
+    for (int i = 0; i < kLanes; ++i) {
+      if (!leaving.on[i]) continue;
       const Sampler& sampler = *start.samplers[i];
       const Vec2f random = sampler.Pair(pairs.Direction(bounce));
-      Vec3f factor = places->albedo[i], toward;  // cosine-distributed: BRDF · cos / density is the albedo
-      if constexpr (kCoat) {
-        const CoatedPlace place = places->lanes()[i];
+      Vec3f factor = lit.albedo[i], toward;  // cosine-distributed: BRDF · cos / density is the albedo
+      if constexpr (kCoat && kTissue) {
+        const LobeStep step = ByOneLobe(stop, i, random, sampler.Pair(pairs.Roulette(bounce))[1]);
+        factor = step.factor;
+        toward = step.toward;
+        leaving.by_glint[i] = step.by_glint ? -1 : 0;
+        if (factor.isZero(0)) leaving.on[i] = 0;
+      } else if constexpr (kCoat) {
+        const CoatedPlace place = lit.lanes()[i];
         // The roulette's second number is free to choose the lobe.
-        toward = places->coat->Sample(place, random, sampler.Pair(pairs.Roulette(bounce))[1]);
-        const CoatLobes lobes = places->coat->Eval(place, toward);
-        factor = (lobes.base + Vec3f::Constant(lobes.glint)) / places->coat->Pdf(place, toward);
+        toward = lit.coat->Sample(place, random, sampler.Pair(pairs.Roulette(bounce))[1]);
+        const CoatLobes lobes = lit.coat->Eval(place, toward);
+        factor = (lobes.base + Vec3f::Constant(lobes.glint)) / lit.coat->Pdf(place, toward);
       } else {
-        toward = lambert::Sample(places->normal[i], random);
+        toward = lambert::Sample(lit.normal[i], random);
       }
       Vec3f seen = (*weight)[i].cwiseProduct(factor);
       Vec3f passed = (*throughput)[i];
       if (bounce > 2) passed = passed.cwiseProduct(factor).eval();
       if (bounce > options_.roulette_after) {
         const float survival = std::min(1.0f, std::sqrt(seen.maxCoeff()));
-        if (sampler.Pair(pairs.Roulette(bounce))[0] >= survival) places->alive[i] = 0;
+        if (sampler.Pair(pairs.Roulette(bounce))[0] >= survival) leaving.on[i] = 0;
         passed /= survival;
         seen /= survival;
       }
       weight->Set(i, seen);
       throughput->Set(i, passed);
-      direction.Set(i, toward);
+      leaving.direction.Set(i, toward);
     }
-    return direction;
+    if constexpr (kCoat && kTissue) {
+      leaving.origin = OffsetOrigin(Select(leaving.by_glint, stop.places.point, lit.point),
+                                    Select(leaving.by_glint, stop.places.normal, lit.normal));
+    } else {
+      leaving.origin = OffsetOrigin(lit.point, lit.normal);
+    }
+    return leaving;
   }
 
-  // Where light comes in that leaves the ends. Below a coat that is the ends themselves: its glints would
-  // need a path of their own.
-  const PlacesOf<kCoat>& Lit(const FarEnds<kCoat>& ends) const {
-    if constexpr (!kCoat) {
-      if (walks_) return ends.entries;
+  // A direction of one of the lobes, and what the lobe sends on of the light that comes along it over the
+  // density of lobe and direction; nothing where the walk got lost or the mirror direction is below the wall.
+  struct LobeStep {
+    Vec3f toward, factor;
+    bool by_glint;
+  };
+  static LobeStep ByOneLobe(const PathPlaces<true, true>& stop, int lane, const Vec2f& random, float choice) {
+    const Coat& coat = *stop.places.coat;
+    const CoatedPlace place = stop.places.lanes()[lane];
+    const float share = coat.GlintShare(place);
+    if (choice < share) {
+      const Coat::Glint glint = coat.SampleGlint(place, random);
+      return {glint.incoming, Vec3f::Constant(glint.weight / share), true};
     }
-    return ends.places;
-  }
-
-  Places Entries(float time, const HitPacket& hits, const Places& places, int bounce,
-                 const BounceStart& start, int64_t* rays) const {
-    return walks_->Entries(
-        time, hits, places, bounce, [&](int i) { return *start.samplers[i]; }, rays);
-  }
-
-  static Lanes Numbers(const BounceStart& start, const LanesI& alive, uint32_t pair) {
-    Lanes numbers{};
-    for (int i = 0; i < kLanes; ++i) {
-      if (alive[i]) numbers[i] = start.samplers[i]->Pair(pair)[0];
-    }
-    return numbers;
+    const CoatedPlace entry = stop.entries.lanes()[lane];
+    if (entry.albedo.isZero(0)) return {Vec3f::Zero(), Vec3f::Zero(), false};
+    const Vec3f toward = lambert::Sample(entry.normal, random);
+    return {toward, entry.albedo * (coat.Transmission(entry, toward) / (1 - share)), false};
   }
 
   const RayScene& wall_;

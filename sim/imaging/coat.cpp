@@ -160,9 +160,13 @@ float Coat::GlintBrdf(const Vec3f& normal, const Vec3f& incoming, const Vec3f& o
 CoatLobes Coat::Eval(const CoatedPlace& place, const Vec3f& incoming) const {
   const float cosine = incoming.dot(place.normal), coat_cosine = incoming.dot(place.coat_normal);
   if (!(cosine > 0)) return {Vec3f::Zero(), 0};
-  const float share = (1 - place.reflectance) * (1 - Reflectance(coat_cosine)) / (1 - mean_reflectance_);
-  return {share * cosine * lambert::Eval(place.albedo),
+  return {Transmission(place, incoming) * cosine * lambert::Eval(place.albedo),
           coat_cosine > 0 ? coat_cosine * GlintBrdf(place.coat_normal, incoming, place.outgoing) : 0.0f};
+}
+
+float Coat::Transmission(const CoatedPlace& place, const Vec3f& incoming) const {
+  return (1 - place.reflectance) * (1 - Reflectance(incoming.dot(place.coat_normal))) /
+         (1 - mean_reflectance_);
 }
 
 Lanes Coat::Transmission(const CoatedLanes& places, const Lanes3& incoming) const {
@@ -195,10 +199,15 @@ CoatLobesLanes Coat::Eval(const CoatedLanes& places, const Lanes3& incoming) con
   return {EvalBase(places, incoming), EvalGlint(places, incoming)};
 }
 
-// How many of the sampled directions are the coat's: its part of what leaves the place.
 float Coat::GlintShare(const CoatedPlace& place) const {
   if (!(place.outgoing.dot(place.coat_normal) > 0)) return 0;
   return place.reflectance / (place.reflectance + (1 - place.reflectance) * place.albedo.maxCoeff());
+}
+
+Lanes Coat::GlintShare(const CoatedLanes& places) const {
+  return Dot(places.outgoing, places.coat_normal) > 0.0f
+             ? places.reflectance / (places.reflectance + (1.0f - places.reflectance) * MaxOf(places.albedo))
+             : Lanes{};
 }
 
 float Coat::Pdf(const CoatedPlace& place, const Vec3f& incoming) const {
@@ -220,13 +229,9 @@ Lanes Coat::GlintPdf(const CoatedLanes& places, const Lanes3& incoming) const {
 }
 
 Lanes Coat::Pdf(const CoatedLanes& places, const Lanes3& incoming) const {
-  const Lanes zero{};
-  const Lanes cos_out = Dot(places.outgoing, places.coat_normal), cosine = Dot(incoming, places.normal);
-  const Lanes palest = Max(places.albedo.x, Max(places.albedo.y, places.albedo.z));
-  const Lanes share = cos_out > 0.0f
-                          ? places.reflectance / (places.reflectance + (1.0f - places.reflectance) * palest)
-                          : zero;
-  return (1.0f - share) * (cosine > 0.0f ? cosine * kInversePi : zero) + share * GlintPdf(places, incoming);
+  const Lanes share = GlintShare(places), cosine = Dot(incoming, places.normal);
+  return (1.0f - share) * (cosine > 0.0f ? cosine * kInversePi : Lanes{}) +
+         share * GlintPdf(places, incoming);
 }
 
 Vec3f Coat::Mirrored(const CoatedPlace& place, const Vec2f& random) const {

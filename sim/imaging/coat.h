@@ -110,6 +110,7 @@ class Coat {
   // unbounded radiance; the guides themselves, half a mm across or more, spread the half vectors by more than
   // that at up to 250 mm.
   float alpha() const { return alpha_; }
+  float ior() const { return ior_; }
   // E: 0…1; below the horizon as at it.
   float Reflectance(float cosine) const;
   float mean_reflectance() const { return mean_reflectance_; }
@@ -131,7 +132,11 @@ class Coat {
     return lobes.base + Lanes3{lobes.glint, lobes.glint, lobes.glint};
   }
   // What the coat lets by of light that the wall scatters, over that of a wall without one.
+  float Transmission(const CoatedPlace& place, const Vec3f& incoming) const;
   Lanes Transmission(const CoatedLanes& places, const Lanes3& incoming) const;
+  // How many of Sample's directions are the first lobe's: its part of what leaves the place.
+  float GlintShare(const CoatedPlace& place) const;
+  Lanes GlintShare(const CoatedLanes& places) const;
   float Pdf(const CoatedPlace& place, const Vec3f& incoming) const;
   Lanes Pdf(const CoatedLanes& places, const Lanes3& incoming) const;
   // SampleGlint's, before it leaves directions out.
@@ -150,7 +155,6 @@ class Coat {
   static constexpr int kEntries = 129;  // at equal steps of the cosine's root: E is smooth in it
 
   float GlintBrdf(const Vec3f& normal, const Vec3f& incoming, const Vec3f& outgoing) const;
-  float GlintShare(const CoatedPlace& place) const;
   Vec3f Mirrored(const CoatedPlace& place, const Vec2f& random) const;
   float QuadratureOfReflectance(float cosine) const;
 

@@ -17,6 +17,7 @@
 
 namespace lumen {
 
+template <bool kTissue>
 class GlintPaths {
  public:
   // first_pair: of the random numbers of these paths.
@@ -77,9 +78,9 @@ class GlintPaths {
   template <class OnLost>
   void Trace(const Eye& eye, const TileSample<true>& tile, const TileShadows& shadows, Waiting* waiting,
              Lanes3* light, int64_t* rays, const OnLost& lost) const {
-    FarEnds<true> ends = paths_.End(eye, waiting->start, pairs_, rays);
+    FarEnds<true, kTissue> ends = paths_.End(eye, waiting->start, pairs_, rays);
     paths_.AddRest(eye, waiting->start, pairs_, &ends, rays);
-    const LanesI finite = IsFinite(Sum(ends.from_guide.light)) & IsFinite(Sum(ends.from_walls.light));
+    const LanesI finite = ends.Finite();
     for (int i = 0; i < waiting->count; ++i) {
       const Source& source = waiting->source[i];
       if (!ends.places.alive[i]) continue;
@@ -93,12 +94,12 @@ class GlintPaths {
     waiting->start.on = LanesI{};
   }
 
-  void Join(const FarEnds<true>& ends, int lane, const Source& source, const TileSample<true>& tile,
+  void Join(const FarEnds<true, kTissue>& ends, int lane, const Source& source, const TileSample<true>& tile,
             const TileShadows& shadows, Lanes3* light, int64_t* rays) const {
-    const FarEnds<true> end = ends.Lane(lane);
+    const FarEnds<true, kTissue> end = ends.Lane(lane);
     const Lanes3 point = Broadcast(ends.places.point[lane]), normal = end.places.normal;
     const Lanes3 from = OffsetOrigin(point, normal);
-    FarEnds<true>::Sent sent[kBlocks];
+    CoatedLight sent[kBlocks];
     Lanes mirrored[kBlocks], sum{}, sum_on{};
     LanesI joined[kBlocks];
     for (int block = 0; block < kBlocks; ++block) {
@@ -142,7 +143,7 @@ class GlintPaths {
   }
 
   const RayScene& wall_;
-  const BouncePaths<true> paths_;
+  const BouncePaths<true, kTissue> paths_;
   const BouncePairs pairs_;
 };
 

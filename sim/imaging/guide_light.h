@@ -55,17 +55,21 @@ LobesOf<kCoat> Reflected(const Guide& guide, const Incidence& incidence, const P
 
 // Which lobes of the wall the guides' light is followed through where paths from the camera meet it. Without
 // a coat there is one.
-enum class GuideLobes { kAll, kBase };
+enum class GuideLobes { kAll, kBase, kGlint };
 
-// Both lobes' sum, or the base's alone.
+// Both lobes' sum, or one's alone.
 template <bool kCoat>
 Lanes3 Reflected(const Guide& guide, const Incidence& incidence, const PlacesOf<kCoat>& places,
                  GuideLobes lobes) {
   if constexpr (kCoat) {
-    if (lobes == GuideLobes::kBase) {
+    if (lobes != GuideLobes::kAll) {
       const LanesI lit = places.alive & (Dot(places.normal, incidence.toward) > 0.0f);
-      return places.coat->EvalBase(places.lanes(), incidence.toward) * Broadcast(guide.intensity) *
-             (lit ? incidence.per_intensity : Lanes{});
+      const Lanes3 intensity = Broadcast(guide.intensity);
+      const Lanes per_intensity = lit ? incidence.per_intensity : Lanes{};
+      if (lobes == GuideLobes::kGlint) {
+        return intensity * (per_intensity * places.coat->EvalGlint(places.lanes(), incidence.toward));
+      }
+      return places.coat->EvalBase(places.lanes(), incidence.toward) * intensity * per_intensity;
     }
   }
   return Reflected<kCoat>(guide, incidence, places).Whole();

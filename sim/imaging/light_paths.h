@@ -285,7 +285,7 @@ class LightPaths {
   const Eye& eye_;
   const uint64_t seed_, frame_;
   const PlaceFinder<true> finder_;
-  const BouncePaths<true> paths_;
+  const BouncePaths<true, false> paths_;
   std::vector<Beam> beams_;
   int64_t packets_ = 0;
 };

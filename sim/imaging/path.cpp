@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <mutex>
 #include <optional>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -42,9 +43,9 @@ void Note(const Failure& failure, Failure* total) {
   total->count = count;
 }
 
-// One frame's tracing, by tiles. The coat makes a difference inside the loops and is a template parameter,
-// resolved once a frame; other effects make one once a packet at most.
-template <bool kCoat>
+// One frame's tracing, by tiles. The coat and tissue make a difference inside the loops and are template
+// parameters, resolved once a frame; other effects make one once a packet at most.
+template <bool kCoat, bool kTissue>
 class Tracer {
  public:
   Tracer(const PathScene& scene, const View& view, const PathOptions& options, uint64_t seed, int frame)
@@ -61,7 +62,7 @@ class Tracer {
         own_paths_(scene, options, LobesOfBase()),
         shared_paths_(scene, options, LobesOfBase()),
         glint_paths_(GlintPathsOf(scene, options)) {
-    if (scene.surface->subsurface) walks_.emplace(scene);
+    if constexpr (kTissue) walks_.emplace(scene);
   }
 
   // Direct light first; light from wall to wall takes a pass over the frame for each sample, on a grid of
@@ -72,13 +73,13 @@ class Tracer {
     film->radiance = ImageF(width, height, 3);
     if (with_parts) film->direct = film->indirect = film->radiance;
     if (with_parts && kCoat) film->glint = film->radiance;
-    if (with_parts && walks_) film->subsurface = film->radiance;
+    if (with_parts && kTissue) film->subsurface = film->radiance;
     PathCount total;
     ForEachTile({width, height, 0, 0}, &total,
                 [&](const TilePixels& pixels, int, PathCount* count) { TraceDirect(pixels, film, count); });
     if (options_.bounces == 0) return total;
     indirect_.resize(film->radiance.data.size());
-    if (kCoat && walks_) mirrored_.resize(indirect_.size());
+    if (kCoat && kTissue) mirrored_.resize(indirect_.size());
     for (int sample = 0; sample < options_.samples; ++sample) {
       const uint64_t shift = RandomBits(seed_, frame_, kShiftKey, static_cast<uint64_t>(sample));
       const TileGrid grid(width, height, static_cast<int>(shift % kTileEdge),
@@ -172,7 +173,7 @@ class Tracer {
           for (int k = i; k < kLanes; k += group_pixels) mean[lobe] += sums[lobe][c][k] / kept;
         }
         film->radiance.Pixel(x, y)[c] = static_cast<float>(mean[0] + mean[1]);
-        ImageF& scattered = walks_ ? film->subsurface : film->direct;
+        ImageF& scattered = kTissue ? film->subsurface : film->direct;
         if (!scattered.empty()) scattered.Pixel(x, y)[c] = static_cast<float>(mean[0]);
         if (!film->glint.empty()) film->glint.Pixel(x, y)[c] = static_cast<float>(mean[1]);
       }
@@ -183,11 +184,12 @@ class Tracer {
                          PathCount* count) const {
     HitPacket hits;
     const PlacesOf<kCoat> places = Look(eye, packet, &hits, count);
-    if (kCoat || !walks_) AddDirect(eye, places, true, light, count);
-    if (!walks_) return;
-    LobesOf<kCoat> scattered{};
-    AddDirect(eye, Entries(eye.time, hits, places, packet, count), false, &scattered, count);
-    light->base = scattered.base;
+    if (kCoat || !kTissue) AddDirect(eye, places, true, light, count);
+    if constexpr (kTissue) {
+      LobesOf<kCoat> scattered{};
+      AddDirect(eye, Entries(eye.time, hits, places, packet, count), false, &scattered, count);
+      light->base = scattered.base;
+    }
   }
 
   // Where what is seen of tissue came in.
@@ -196,7 +198,7 @@ class Tracer {
     const auto sampler = [&](int i) {
       return Sampler(seed_, packet.key[i], packet.sample[i], options_.sampler);
     };
-    return walks_->Entries(time, hits, places, 0, sampler, &count->rays);
+    return walks_->Entries(time, hits, places, WalkPair(0), false, sampler, &count->rays);
   }
 
   static void Accumulate(const Lanes3& light, double (*sums)[kLanes]) {
@@ -232,11 +234,12 @@ class Tracer {
     // The coat mirrors its light where the pixels look, not where light enters the tissue.
     if constexpr (kCoat) AddGlints(tile_eye, pixels, sample, &tile, count);
     for (int block = 0; block < kBlocks; ++block) {
-      if (!Any(pixels.on[block]) || !(walks_ || options_.shared_paths == 0)) continue;
+      if (!Any(pixels.on[block]) || !(kTissue || options_.shared_paths == 0)) continue;
       std::optional<Eye> own;
       const Eye& eye = eye_of(block, &own);
       const PixelSamples packet = SamplesOf(pixels, block, sample);
-      if (walks_) tile.places[block] = Entries(eye.time, hits[block], tile.places[block], packet, count);
+      if constexpr (kTissue)
+        tile.places[block] = Entries(eye.time, hits[block], tile.places[block], packet, count);
       if (options_.shared_paths == 0) AddOwnPaths(eye, packet, block, &tile, count);
     }
     if (options_.shared_paths > 0) {
@@ -263,7 +266,7 @@ class Tracer {
     const auto lost = [&](const auto& path) {
       Note({1, pixels.X(path.block, path.lane), pixels.Y(path.block, path.lane), sample}, &count->failure);
     };
-    glint_paths_->Add(eye, *tile, sampler_of, walks_ ? tile->mirrored : tile->indirect, &count->rays, lost);
+    glint_paths_->Add(eye, *tile, sampler_of, kTissue ? tile->mirrored : tile->indirect, &count->rays, lost);
   }
 
   void JoinPhotons(const TilePixels& pixels, int tile_number, int sample, const PhotonsOfTiles& photons,
@@ -304,9 +307,9 @@ class Tracer {
     }
   }
 
-  static std::optional<GlintPaths> GlintPathsOf(const PathScene& scene, const PathOptions& options) {
+  static std::optional<GlintPaths<kTissue>> GlintPathsOf(const PathScene& scene, const PathOptions& options) {
     if (!kCoat || options.bounces == 0) return std::nullopt;
-    return std::make_optional<GlintPaths>(scene, options, kGlintPairs);
+    return std::make_optional<GlintPaths<kTissue>>(scene, options, kGlintPairs);
   }
 
   std::optional<LightPaths> PathsFromGuides() const {
@@ -318,7 +321,7 @@ class Tracer {
   GuideLobes LobesOfBase() const { return light_paths_ ? GuideLobes::kBase : GuideLobes::kAll; }
 
   void AddIndirect(Film* film) const {
-    ImageF& part = walks_ ? film->subsurface : film->indirect;
+    ImageF& part = kTissue ? film->subsurface : film->indirect;
     ParallelFor(0, view_.valid->height, [&](int64_t y) {
       for (int x = 0; x < view_.valid->width; ++x) {
         const size_t pixel = static_cast<size_t>(y) * view_.valid->width + x;
@@ -451,7 +454,7 @@ class Tracer {
           start.samplers[i].emplace(seed_, packet.key[i], packet.sample[i], options_.sampler);
       start.direction.Set(i, lambert::Sample(places.normal[i], sampler.Pair(kPairs.Direction(1))));
     }
-    FarEnds<kCoat> ends = own_paths_.End(eye, start, kPairs, &count->rays);
+    FarEnds<kCoat, kTissue> ends = own_paths_.End(eye, start, kPairs, &count->rays);
     own_paths_.AddRest(eye, start, kPairs, &ends, &count->rays);
     Lanes3 light = places.albedo * ends.RadianceTo(start.direction * Broadcast(-1));
     if constexpr (kCoat) light = light * places.coat->Transmission(places.lanes(), start.direction);
@@ -467,9 +470,9 @@ class Tracer {
   const Eye eye_;                                // at the frame's moment
   const std::optional<LightPaths> light_paths_;  // that bring what the coat mirrors onto other walls
   const PlaceFinder<kCoat> finder_;
-  const BouncePaths<kCoat> own_paths_;
-  const SharedPaths<kCoat> shared_paths_;
-  const std::optional<GlintPaths> glint_paths_;
+  const BouncePaths<kCoat, kTissue> own_paths_;
+  const SharedPaths<kCoat, kTissue> shared_paths_;
+  const std::optional<GlintPaths<kTissue>> glint_paths_;
   std::optional<TissueWalks<kCoat>> walks_;
   std::vector<double> indirect_;  // sums over samples, RGB of each pixel
   std::vector<double> mirrored_;  // likewise off the coat, where there is tissue below; else in indirect_
@@ -481,8 +484,14 @@ class Tracer {
 
 PathCount RenderFrame(const PathScene& scene, const View& view, const PathOptions& options, uint64_t seed,
                       int frame, bool with_parts, Film* film) {
-  return scene.surface->coat ? Tracer<true>(scene, view, options, seed, frame).Run(with_parts, film)
-                             : Tracer<false>(scene, view, options, seed, frame).Run(with_parts, film);
+  const auto trace = [&](auto coat, auto tissue) {
+    return Tracer<coat(), tissue()>(scene, view, options, seed, frame).Run(with_parts, film);
+  };
+  constexpr std::true_type kThere;
+  constexpr std::false_type kNone;
+  const bool tissue = scene.surface->subsurface.has_value();
+  if (scene.surface->coat) return tissue ? trace(kThere, kThere) : trace(kThere, kNone);
+  return tissue ? trace(kNone, kThere) : trace(kNone, kNone);
 }
 
 }  // namespace lumen

@@ -50,7 +50,11 @@ class PlaceFinder {
       while (model < kLanes && !places.alive[model]) ++model;
       if (model == kLanes) {
         places.point = places.normal = places.albedo = Lanes3{};
-        if constexpr (kCoat) places.coat = &*scene_.surface->coat;
+        if constexpr (kCoat) {
+          places.coat = &*scene_.surface->coat;
+          places.outgoing = places.coat_normal = Lanes3{};
+          places.reflectance = Lanes{};
+        }
         return places;
       }
       for (int i = 0; i < kLanes; ++i) {

@@ -22,7 +22,7 @@
 
 namespace lumen {
 
-template <bool kCoat>
+template <bool kCoat, bool kTissue>
 class SharedPaths {
  public:
   SharedPaths(const PathScene& scene, const PathOptions& options, GuideLobes guide_lobes)
@@ -89,13 +89,13 @@ class SharedPaths {
   static constexpr BouncePairs kPairs{1};
 
   struct Packet {
-    FarEnds<kCoat> ends;
+    FarEnds<kCoat, kTissue> ends;
     int source[kLanes];  // place that each path starts from
     Lanes brightness;
   };
 
   // What the choice of the joins goes by: the root mean square of what the places would get, shadows apart.
-  static Lanes Brightness(const FarEnds<false>& ends, const BounceStart& start,
+  static Lanes Brightness(const FarEnds<false, kTissue>& ends, const BounceStart& start,
                           const TileSample<false>& tile) {
     Lanes brightness = LuminanceOf(ends.RadianceTo(start.direction * Broadcast(-1)));
     for (int i = 0; i < kLanes; ++i) {
@@ -112,11 +112,12 @@ class SharedPaths {
     return brightness;
   }
   // A coat sends to each place something else: the root mean square of what they would get, shadows apart.
-  static Lanes Brightness(const FarEnds<true>& ends, const BounceStart&, const TileSample<true>& tile) {
+  static Lanes Brightness(const FarEnds<true, kTissue>& ends, const BounceStart&,
+                          const TileSample<true>& tile) {
     Lanes brightness{};
     for (int i = 0; i < kLanes; ++i) {
       if (!ends.places.alive[i]) continue;
-      const FarEnds<true> end = ends.Lane(i);
+      const FarEnds<true, kTissue> end = ends.Lane(i);
       const Lanes3 point = Broadcast(ends.places.point[i]);
       Lanes couplings{}, densities{}, squares[3] = {};
       for (int block = 0; block < kBlocks; ++block) {
@@ -199,8 +200,8 @@ class SharedPaths {
     return start;
   }
 
-  void Join(const FarEnds<kCoat>& ends, int lane, int source, float share, const TileShadows& shadows,
-            TileSample<kCoat>* tile, int64_t* rays) const {
+  void Join(const FarEnds<kCoat, kTissue>& ends, int lane, int source, float share,
+            const TileShadows& shadows, TileSample<kCoat>* tile, int64_t* rays) const {
     const Lanes3 point = Broadcast(ends.places.point[lane]), normal = Broadcast(ends.places.normal[lane]);
     const Lanes3 from = OffsetOrigin(point, normal);
     Lanes coupling[kBlocks], sum{};
@@ -218,7 +219,7 @@ class SharedPaths {
     const float total = Total(sum);
     // Rounding can turn the path's own start away; then nothing is seen from where it ended.
     if (!(total > 0)) return;
-    const FarEnds<kCoat> end = ends.Lane(lane);
+    const FarEnds<kCoat, kTissue> end = ends.Lane(lane);
     if constexpr (kCoat) {
       AddCoated(end, coupling, point, share, total, tile);
     } else {
@@ -234,9 +235,9 @@ class SharedPaths {
   // Beyond an end a path's direction, too, could have been chosen by paths from all the places: under a coat
   // with another density by each. That density goes into the balance heuristic, so that a glint of the light
   // from other walls weighs no more towards a place that the path did not come from.
-  static void AddCoated(const FarEnds<true>& end, const Lanes* coupling, const Lanes3& point, float share,
-                        float total, TileSample<true>* tile) {
-    typename FarEnds<true>::Sent sent[kBlocks];
+  static void AddCoated(const FarEnds<true, kTissue>& end, const Lanes* coupling, const Lanes3& point,
+                        float share, float total, TileSample<true>* tile) {
+    CoatedLight sent[kBlocks];
     Lanes sum{};
     for (int block = 0; block < kBlocks; ++block) {
       const LanesI joined = coupling[block] > 0.0f;
@@ -265,7 +266,7 @@ class SharedPaths {
   // Least time to a given noise, of 1 to 8 without a coat; with one, of 4 and 8 where ends mirror the guides'
   // light, of 2 to 16 where they don't.
   const int paths_per_join_;
-  BouncePaths<kCoat> paths_;
+  BouncePaths<kCoat, kTissue> paths_;
 };
 
 }  // namespace lumen

@@ -1,5 +1,5 @@
-// Subsurface scattering in packets of sixteen places: what the wall sends from where it is seen came in where
-// walks through the tissue lead.
+// Subsurface scattering in packets of sixteen places: what the wall sends from there came in where walks
+// through the tissue lead.
 #pragma once
 
 #include <bit>
@@ -15,8 +15,8 @@
 
 namespace lumen {
 
-// Pairs of random numbers of the walk after so many bounces: no other use of a sampler has pairs from here on
-// but for the last of all.
+// The first of two pairs of random numbers of the walk after so many bounces: no other use of a sampler has
+// pairs from here on but for the last of all.
 constexpr uint32_t WalkPair(int bounce) { return (1u << 31) + 2 * static_cast<uint32_t>(bounce); }
 
 template <bool kCoat>
@@ -34,10 +34,11 @@ class TissueWalks {
 
   // Where light comes in that leaves the places, alive where there is such light. As albedo they have what
   // of it leaves there, RGB: what the walk carries, dimmed by the texture at both of its ends. The coat's
-  // reflectance stays that of the places. time: of a wall that moves; sampler(i): lane i's; rays are counted.
+  // reflectance stays that of the places. time: of a wall that moves; pair: the first of two; bounced: paths
+  // come there from the wall; sampler(i): lane i's; rays are counted.
   template <class Samplers>
-  PlacesOf<kCoat> Entries(float time, const HitPacket& hits, const PlacesOf<kCoat>& places, int bounce,
-                          const Samplers& sampler, int64_t* rays) const {
+  PlacesOf<kCoat> Entries(float time, const HitPacket& hits, const PlacesOf<kCoat>& places, uint32_t pair,
+                          bool bounced, const Samplers& sampler, int64_t* rays) const {
     RayPacket onto{};
     onto.time = time;
     HitPacket ends{};
@@ -47,10 +48,9 @@ class TissueWalks {
       if (!places.alive[i]) continue;
       const Vec3f normal = places.normal[i];
       const Sampler random = sampler(i);
-      const WalkExit exit = tissue_.Walk(wall_,
-                                         {hits.face[i], places.point[i], normal,
-                                          lambert::Sample(-normal, random.Pair(WalkPair(bounce))), time},
-                                         Stream(random.Pair(WalkPair(bounce) + 1)), rays);
+      const WalkExit exit = tissue_.Walk(
+          wall_, {hits.face[i], places.point[i], normal, lambert::Sample(-normal, random.Pair(pair)), time},
+          Stream(random.Pair(pair + 1)), rays);
       if (!exit.found) continue;
       ends.face[i] = exit.hit.face;
       ends.u[i] = exit.hit.u;
@@ -61,7 +61,7 @@ class TissueWalks {
       }
       weight.Set(i, exit.weight);
     }
-    PlacesOf<kCoat> entries = finder_.Find(onto, ends, bounce > 0);
+    PlacesOf<kCoat> entries = finder_.Find(onto, ends, bounced);
     const Lanes3 both = places.albedo * entries.albedo;
     const auto dimmed = [](const Lanes& weight, const Lanes& both, float per_palest) {
       return weight * (Sqrt(both) * per_palest);
