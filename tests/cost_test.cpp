@@ -180,7 +180,7 @@ TEST(RenderCost, KnobsAreTheOnesThatTheSceneKnows) {
   EXPECT_EQ(names(), (std::vector<std::string>{"samples", "roulette_after", "shared_paths", "sampler",
                                                "packets", "precision", "bounces"}));
   scene.path.bounces = 0;
-  scene.surface.coat = Coat({});  // the plain tracer has none
+  scene.defocus = Defocus{0.3, 15};  // the plain tracer has none
   EXPECT_EQ(names(), (std::vector<std::string>{"samples", "sampler", "bounces"}));
 }
 

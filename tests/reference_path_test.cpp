@@ -11,6 +11,7 @@
 #include "sim/ground_truth.h"
 #include "tests/path_stage.h"
 #include "tests/support.h"
+#include "tests/tissue_means.h"
 #include "tests/welch.h"
 
 namespace lumen::test {
@@ -39,7 +40,8 @@ View ViewOf(const Stage& stage, const Camera<float>& camera) {
 template <class T>
 ImageF Plain(const Stage& stage, uint64_t seed) {
   const Camera<float> camera(stage.intrinsics);
-  return RenderReference<T>({&stage.wall, &stage.surface, 0}, ViewOf(stage, camera), stage.options, seed, 0);
+  return RenderReference<T>({&stage.wall, &stage.surface, 0, &stage.vertex_normals}, ViewOf(stage, camera),
+                            stage.options, seed, 0);
 }
 
 ImageF Fast(const Stage& stage, uint64_t seed) { return stage.Render(seed).radiance; }
@@ -161,10 +163,56 @@ TEST(ReferencePath, LightBetweenWallsByBlocks) {
   EXPECT_GT(BlocksOff(wrong, plain), 40);  // of 90
 }
 
+// A cavity in tissue under a strong coat on a relief, as narrow as walks are long, with a polyp in sight that
+// light goes through. The guide shines away from what is seen, so that light between walls is nearly all.
+Stage CoatedCavity() {
+  Mesh mesh = Globe(6, 24), polyp = Globe(1.2, 10);
+  const int first = static_cast<int>(mesh.vertices.size());
+  for (const Vec3d& vertex : polyp.vertices) mesh.vertices.push_back(vertex + Vec3d(0.8, -0.5, 3));
+  for (const Vec3i& face : polyp.faces) {
+    mesh.faces.push_back(Vec3i(face[0], face[2], face[1]) + Vec3i::Constant(first));
+  }
+  Stage stage(std::move(mesh), CentredPinhole(24, 16, 12));
+  stage.surface.albedo = Vec3d(0.8, 0.5, 0.3);
+  stage.surface.mottling = Mottling{};
+  stage.surface.coat.emplace(CoatOptions{1.9, 0.6, 1, 0.06});
+  stage.surface.subsurface.emplace(WithAlbedos({0.97, 0.9, 0.7}, {0.5, 1, 2}));
+  stage.light.sources[0] = {Vec3d(1, 0.5, 0), Vec3d(0.2, 0.1, -1).normalized(), 3, Vec3d(300, 400, 500)};
+  stage.world_from_camera.translation() = Vec3d(-0.5, 0.3, -1);
+  return stage;
+}
+
+TEST(ReferencePath, CoatOverTissueByBlocks) {
+  Stage stage = CoatedCavity();
+  for (const int bounces : {1, 4}) {
+    stage.options = {8, bounces, 2};
+    const BlockMeans plain = MeansOf([&](uint64_t seed) { return Plain<double>(stage, 1000 + seed); });
+    for (const int shared_paths : {0, 16}) {
+      stage.options.shared_paths = shared_paths;
+      const BlockMeans fast = MeansOf([&](uint64_t seed) { return Fast(stage, seed); });
+      EXPECT_EQ(BlocksOff(fast, plain), 0) << bounces << ' ' << shared_paths;
+    }
+    // A wall that reflects as much of even light, but on the spot.
+    Stage on_the_spot = CoatedCavity();
+    on_the_spot.options = stage.options;
+    on_the_spot.surface.albedo = stage.surface.subsurface->EvenReflectance().cast<double>();
+    on_the_spot.surface.mottling.reset();
+    on_the_spot.surface.subsurface.reset();
+    const BlockMeans wrong = MeansOf([&](uint64_t seed) { return Fast(on_the_spot, seed); });
+    EXPECT_GT(BlocksOff(wrong, plain), 9) << bounces;  // of 18
+  }
+}
+
 TEST(ReferencePath, RefusesWhatItDoesNotKnow) {
-  Stage stage = StageIn(Globe(18, 10));
-  stage.surface.coat = Coat({});
-  EXPECT_NE(ErrorOf([&] { Plain<double>(stage, 0); }).find("coat"), std::string::npos);
+  const Stage stage = StageIn(Globe(18, 10));
+  const Camera<float> camera(stage.intrinsics);
+  const Defocus defocus{0.3, 10};
+  View view = ViewOf(stage, camera);
+  view.defocus = &defocus;
+  const auto render = [&] {
+    RenderReference<double>({&stage.wall, &stage.surface, 0}, view, stage.options, 0, 0);
+  };
+  EXPECT_NE(ErrorOf(render).find("defocus"), std::string::npos);
 }
 
 }  // namespace

@@ -80,8 +80,7 @@ std::vector<Knob> KnobsOf(const Scene& scene) {
         [](int n, PathOptions* options) { options->shared_paths = n; }, [](int) { return 1.0; }));
   }
   knobs.push_back(SamplerKnob(own));
-  if (MissingInReference(scene.surface, scene.sensor.shutter.has_value(), scene.defocus.has_value())
-          .empty()) {
+  if (MissingInReference(scene.sensor.shutter.has_value(), scene.defocus.has_value()).empty()) {
     knobs.push_back(PacketsKnob(own));
     knobs.push_back(PrecisionKnob(own));
   }
