@@ -1,6 +1,7 @@
 // The path tracer on a wall with a coat of mucus.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 
@@ -9,7 +10,7 @@
 #include "common/random.h"
 #include "sim/imaging/path.h"
 #include "tests/path_stage.h"
-#include "tests/welch.h"
+#include "tests/seed_means.h"
 
 namespace lumen {
 namespace {
@@ -216,43 +217,19 @@ TEST(CoatedPath, SharedPathsAgreeWithOwnOnes) {
   Stage stage(32, 24, 16);
   stage.surface.coat.emplace(CoatOptions{1.37, 0.3, 1, 0.06});
   stage.options.bounces = 4;
-  constexpr int kSeeds = 12, kAcross = 4, kDown = 3;
-  struct Blocks {
-    double mean[kAcross * kDown] = {}, variance[kAcross * kDown] = {};  // of the mean
-  };
   const auto measure = [&](int shared_paths, int samples, double albedo) {
     stage.options.shared_paths = shared_paths;
     stage.options.samples = samples;
     stage.surface.albedo = Vec3d(0.8, albedo, 0.3);
-    Blocks blocks;
-    double squares[kAcross * kDown] = {};
-    for (int seed = 0; seed < kSeeds; ++seed) {
-      const ImageF light = stage.Render(true, 40 + seed + 100 * shared_paths).indirect;
-      double sums[kAcross * kDown] = {};
-      for (int y = 0; y < 24; ++y) {
-        for (int x = 0; x < 32; ++x) sums[y / 8 * kAcross + x / 8] += light.Pixel(x, y)[1] / 64.0;
-      }
-      for (int i = 0; i < kAcross * kDown; ++i) {
-        blocks.mean[i] += sums[i] / kSeeds;
-        squares[i] += sums[i] * sums[i];
-      }
-    }
-    for (int i = 0; i < kAcross * kDown; ++i) {
-      blocks.variance[i] =
-          (squares[i] - kSeeds * blocks.mean[i] * blocks.mean[i]) / (kSeeds * (kSeeds - 1.0));
+    test::SeedMeans blocks;
+    for (int seed = 0; seed < 12; ++seed) {
+      blocks.Add(test::BlockMeansOf(stage.Render(true, 40 + seed + 100 * shared_paths).indirect, 8));
     }
     return blocks;
   };
-  const Blocks own = measure(0, 64, 0.5), shared = measure(16, 16, 0.5), paler = measure(16, 16, 0.53);
-  double least_chance = 1;
-  for (int i = 0; i < kAcross * kDown; ++i) {
-    EXPECT_GT(test::WelchChance(shared.mean[i] - own.mean[i], own.variance[i], shared.variance[i], kSeeds),
-              test::SharedOut(1e-3, kAcross * kDown))
-        << i << ": " << shared.mean[i] << " against " << own.mean[i];
-    least_chance = std::min(least_chance, test::WelchChance(paler.mean[i] - own.mean[i], own.variance[i],
-                                                            paler.variance[i], kSeeds));
-  }
-  EXPECT_LT(least_chance, test::SharedOut(1e-3, kAcross * kDown));  // 6% more light between walls is noticed
+  const test::SeedMeans own = measure(0, 64, 0.5), shared = measure(16, 16, 0.5);
+  EXPECT_EQ(test::CountOff(shared, own, 1e-3), 0);
+  EXPECT_GT(test::CountOff(measure(16, 16, 0.53), own, 1e-3), 0);  // 6% more light between walls is noticed
 }
 
 // More samples of direct light leave the light between walls as it was, and have the direct light's mean.

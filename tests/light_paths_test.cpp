@@ -4,10 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "tests/path_stage.h"
-#include "tests/welch.h"
+#include "tests/seed_means.h"
 
 namespace lumen {
 namespace {
@@ -31,57 +29,31 @@ test::Stage GlintingGlobe() {
   return stage;
 }
 
-// Blocks' means of green light between walls over seeds, and their variances.
-struct Blocks {
-  double mean[kAcross * kDown] = {}, variance[kAcross * kDown] = {};
-};
-
-Blocks Measure(const test::Stage& stage, uint64_t first_seed, const Defocus* defocus) {
-  Blocks blocks;
-  double squares[kAcross * kDown] = {};
+// Blocks' light between walls over seeds.
+test::SeedMeans Measure(const test::Stage& stage, uint64_t first_seed, const Defocus* defocus) {
+  test::SeedMeans blocks;
   for (int seed = 0; seed < kSeeds; ++seed) {
     Film film;
     EXPECT_EQ(stage.Render(first_seed + seed, true, &film, defocus).failure.count, 0);
-    double sums[kAcross * kDown] = {};
-    for (int y = 0; y < film.indirect.height; ++y) {
-      for (int x = 0; x < film.indirect.width; ++x) {
-        sums[y / kBlockEdge_px * kAcross + x / kBlockEdge_px] +=
-            film.indirect.Pixel(x, y)[1] / double(kBlockEdge_px * kBlockEdge_px);
-      }
-    }
-    for (int i = 0; i < kAcross * kDown; ++i) {
-      blocks.mean[i] += sums[i] / kSeeds;
-      squares[i] += sums[i] * sums[i];
-    }
-  }
-  for (int i = 0; i < kAcross * kDown; ++i) {
-    blocks.variance[i] = (squares[i] - kSeeds * blocks.mean[i] * blocks.mean[i]) / (kSeeds * (kSeeds - 1.0));
+    blocks.Add(test::BlockMeansOf(film.indirect, kBlockEdge_px));
   }
   return blocks;
-}
-
-double LeastChance(const Blocks& a, const Blocks& b) {
-  double least = 1;
-  for (int i = 0; i < kAcross * kDown; ++i) {
-    least = std::min(least, test::WelchChance(a.mean[i] - b.mean[i], a.variance[i], b.variance[i], kSeeds));
-  }
-  return least;
 }
 
 // Welch's test of blocks' means, one false alarm in 1,000; an index of refraction whose reflectance is 15%
 // too high is noticed. After one bounce and after three, the last between walls.
 TEST(LightPaths, AgreeWithPathsFromTheCamera) {
   const Defocus point{1e-6, 10};
-  const double bound = test::SharedOut(1e-3, kAcross * kDown);
   for (const int bounces : {1, 3}) {
     test::Stage stage = GlintingGlobe();
     stage.options.bounces = bounces;
     if (bounces == 1) stage.options.samples = 64;  // they cost less
-    const Blocks from_camera = Measure(stage, 100, &point), from_guides = Measure(stage, 200, nullptr);
-    EXPECT_GT(LeastChance(from_camera, from_guides), bound) << bounces;
+    const test::SeedMeans from_camera = Measure(stage, 100, &point),
+                          from_guides = Measure(stage, 200, nullptr);
+    EXPECT_EQ(test::CountOff(from_camera, from_guides, 1e-3), 0) << bounces;
     if (bounces > 1) continue;
     stage.surface.coat.emplace(CoatOptions{1.8835, 0.3, 1, 0.06});
-    EXPECT_LT(LeastChance(from_camera, Measure(stage, 200, nullptr)), bound);
+    EXPECT_GT(test::CountOff(from_camera, Measure(stage, 200, nullptr), 1e-3), 0);
   }
 }
 
@@ -92,8 +64,7 @@ TEST(LightPaths, AgreeWithOwnPathsThroughAWiderLobe) {
   stage.options.bounces = 2;
   stage.options.shared_paths = 0;
   stage.surface.bounced_coat.emplace(CoatOptions{1.8, 0.5, 1, 0.06});
-  EXPECT_GT(LeastChance(Measure(stage, 300, &point), Measure(stage, 400, nullptr)),
-            test::SharedOut(1e-3, kAcross * kDown));
+  EXPECT_EQ(test::CountOff(Measure(stage, 300, &point), Measure(stage, 400, nullptr), 1e-3), 0);
 }
 
 TEST(LightPaths, SameBytesForAnyNumberOfThreads) {

@@ -10,9 +10,9 @@
 
 #include "sim/ground_truth.h"
 #include "tests/path_stage.h"
+#include "tests/seed_means.h"
 #include "tests/support.h"
 #include "tests/tissue_means.h"
-#include "tests/welch.h"
 
 namespace lumen::test {
 namespace {
@@ -97,69 +97,34 @@ TEST(ReferencePath, DirectLightPixelByPixel) {
   }
 }
 
-constexpr int kBlock_px = 8;
+constexpr int kBlock_px = 8, kRenders = 24;
 
-// Means of blocks by channel, over independent renders, and the variances of these means.
-struct BlockMeans {
-  std::vector<double> mean, variance;
-};
-
-constexpr int kRenders = 24;
-
-BlockMeans MeansOf(const std::function<ImageF(uint64_t)>& render) {
-  std::vector<double> sums, squares;
-  for (uint64_t seed = 0; seed < kRenders; ++seed) {
-    const ImageF image = render(seed);
-    const int columns = image.width / kBlock_px, rows = image.height / kBlock_px;
-    std::vector<double> blocks(size_t(columns) * rows * 3, 0);
-    for (int y = 0; y < rows * kBlock_px; ++y) {
-      for (int x = 0; x < columns * kBlock_px; ++x) {
-        const size_t block = size_t(y / kBlock_px) * columns + x / kBlock_px;
-        for (size_t c = 0; c < 3; ++c) blocks[3 * block + c] += image.Pixel(x, y)[c];
-      }
-    }
-    sums.resize(blocks.size());
-    squares.resize(blocks.size());
-    for (size_t i = 0; i < blocks.size(); ++i) {
-      sums[i] += blocks[i];
-      squares[i] += blocks[i] * blocks[i];
-    }
-  }
-  BlockMeans means;
-  for (size_t i = 0; i < sums.size(); ++i) {
-    means.mean.push_back(sums[i] / kRenders);
-    means.variance.push_back((squares[i] / kRenders - means.mean[i] * means.mean[i]) / (kRenders - 1));
-  }
+SeedMeans MeansOf(const std::function<ImageF(uint64_t)>& render) {
+  SeedMeans means;
+  for (uint64_t seed = 0; seed < kRenders; ++seed) means.Add(BlockMeansOf(render(seed), kBlock_px));
   return means;
 }
 
-int BlocksOff(const BlockMeans& a, const BlockMeans& b) {
-  const double count = static_cast<double>(a.mean.size()), each = SharedOut(1e-4, count);
-  int off = 0;
-  for (size_t i = 0; i < a.mean.size(); ++i) {
-    off += WelchChance(a.mean[i] - b.mean[i], a.variance[i], b.variance[i], kRenders) < each;
-  }
-  return off;
-}
+int BlocksOff(const SeedMeans& a, const SeedMeans& b) { return CountOff(a, b, 1e-4); }
 
 TEST(ReferencePath, LightBetweenWallsByBlocks) {
   Stage stage = StageIn(Tube(18, 40, 20, 30));
   stage.surface.mottling = Mottling{};
   stage.surface.vessels.emplace(VesselOptions{}, stage.mesh, 1);
   stage.options = {16, 4, 1};
-  const BlockMeans plain = MeansOf([&](uint64_t seed) { return Plain<double>(stage, 1000 + seed); });
-  const BlockMeans single = MeansOf([&](uint64_t seed) { return Plain<float>(stage, 2000 + seed); });
+  const SeedMeans plain = MeansOf([&](uint64_t seed) { return Plain<double>(stage, 1000 + seed); });
+  const SeedMeans single = MeansOf([&](uint64_t seed) { return Plain<float>(stage, 2000 + seed); });
   EXPECT_EQ(BlocksOff(single, plain), 0);
   for (const PathOptions& options : {PathOptions{16, 4, 1, 16}, PathOptions{16, 4, 1, 0},
                                      PathOptions{16, 4, 1, 16, Sampling::kIndependent},
                                      PathOptions{16, 4, 1, 0, Sampling::kIndependent}}) {
     stage.options = options;
-    const BlockMeans fast = MeansOf([&](uint64_t seed) { return Fast(stage, seed); });
+    const SeedMeans fast = MeansOf([&](uint64_t seed) { return Fast(stage, seed); });
     EXPECT_EQ(BlocksOff(fast, plain), 0) << options.shared_paths;
   }
   stage.options = {16, 4, 1, 16};
   stage.surface.albedo *= 1.03;
-  const BlockMeans wrong = MeansOf([&](uint64_t seed) { return Fast(stage, seed); });
+  const SeedMeans wrong = MeansOf([&](uint64_t seed) { return Fast(stage, seed); });
   EXPECT_GT(BlocksOff(wrong, plain), 40);  // of 90
 }
 
@@ -186,10 +151,10 @@ TEST(ReferencePath, CoatOverTissueByBlocks) {
   Stage stage = CoatedCavity();
   for (const int bounces : {1, 4}) {
     stage.options = {8, bounces, 2};
-    const BlockMeans plain = MeansOf([&](uint64_t seed) { return Plain<double>(stage, 1000 + seed); });
+    const SeedMeans plain = MeansOf([&](uint64_t seed) { return Plain<double>(stage, 1000 + seed); });
     for (const int shared_paths : {0, 16}) {
       stage.options.shared_paths = shared_paths;
-      const BlockMeans fast = MeansOf([&](uint64_t seed) { return Fast(stage, seed); });
+      const SeedMeans fast = MeansOf([&](uint64_t seed) { return Fast(stage, seed); });
       EXPECT_EQ(BlocksOff(fast, plain), 0) << bounces << ' ' << shared_paths;
     }
     // A wall that reflects as much of even light, but on the spot.
@@ -198,7 +163,7 @@ TEST(ReferencePath, CoatOverTissueByBlocks) {
     on_the_spot.surface.albedo = stage.surface.subsurface->EvenReflectance().cast<double>();
     on_the_spot.surface.mottling.reset();
     on_the_spot.surface.subsurface.reset();
-    const BlockMeans wrong = MeansOf([&](uint64_t seed) { return Fast(on_the_spot, seed); });
+    const SeedMeans wrong = MeansOf([&](uint64_t seed) { return Fast(on_the_spot, seed); });
     EXPECT_GT(BlocksOff(wrong, plain), 9) << bounces;  // of 18
   }
 }

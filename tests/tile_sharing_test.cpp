@@ -3,11 +3,11 @@
 // their light is found from the camera, each by paths of its own.
 #include <gtest/gtest.h>
 
-#include <algorithm>
+#include <vector>
 
 #include "sim/imaging/tile.h"
 #include "tests/path_stage.h"
-#include "tests/welch.h"
+#include "tests/seed_means.h"
 
 namespace lumen {
 namespace {
@@ -30,38 +30,21 @@ test::Stage GlintingGlobe(double ior) {
 // So far apart that wherever the grid of tiles lies, no two are in one.
 bool IsChosen(int x, int y) { return x % kTileEdge == 5 && y % kTileEdge == 9; }
 
-// The chosen pixels' green light between walls over seeds.
-struct Pixels {
-  double mean[kAcross * kDown] = {}, variance[kAcross * kDown] = {};  // of the mean
-};
-
-Pixels Measure(const test::Stage& stage, uint64_t first_seed) {
-  Pixels pixels;
-  double squares[kAcross * kDown] = {};
+// The chosen pixels' light between walls over seeds.
+test::SeedMeans Measure(const test::Stage& stage, uint64_t first_seed) {
+  test::SeedMeans pixels;
   for (int seed = 0; seed < kSeeds; ++seed) {
     const ImageF light = stage.Render(first_seed + seed, true).indirect;
+    std::vector<double> values;
     for (int y = 0; y < light.height; ++y) {
       for (int x = 0; x < light.width; ++x) {
         if (!IsChosen(x, y)) continue;
-        const double value = light.Pixel(x, y)[1];
-        const int i = y / kTileEdge * kAcross + x / kTileEdge;
-        pixels.mean[i] += value / kSeeds;
-        squares[i] += value * value;
+        for (int c = 0; c < 3; ++c) values.push_back(light.Pixel(x, y)[c]);
       }
     }
-  }
-  for (int i = 0; i < kAcross * kDown; ++i) {
-    pixels.variance[i] = (squares[i] - kSeeds * pixels.mean[i] * pixels.mean[i]) / (kSeeds * (kSeeds - 1.0));
+    pixels.Add(values);
   }
   return pixels;
-}
-
-double LeastChance(const Pixels& a, const Pixels& b) {
-  double least = 1;
-  for (int i = 0; i < kAcross * kDown; ++i) {
-    least = std::min(least, test::WelchChance(a.mean[i] - b.mean[i], a.variance[i], b.variance[i], kSeeds));
-  }
-  return least;
 }
 
 // Welch's test of each pixel, one false alarm in 1,000; a coat that reflects a fifth more is noticed.
@@ -72,10 +55,11 @@ TEST(TileSharing, PixelsGetWhatTheyGetAlone) {
   }
   alone.options.samples = 512;
   together.options.samples = shinier.options.samples = 48;
-  const Pixels own = Measure(alone, 1), shared = Measure(together, 101), more = Measure(shinier, 101);
-  const double bound = test::SharedOut(1e-3, kAcross * kDown);
-  EXPECT_GT(LeastChance(own, shared), bound);
-  EXPECT_LT(LeastChance(own, more), bound);
+  const test::SeedMeans own = Measure(alone, 1), shared = Measure(together, 101),
+                        more = Measure(shinier, 101);
+  ASSERT_EQ(own.size(), size_t{3 * kAcross * kDown});
+  EXPECT_EQ(test::CountOff(own, shared, 1e-3), 0);
+  EXPECT_GT(test::CountOff(own, more, 1e-3), 0);
 }
 
 }  // namespace
