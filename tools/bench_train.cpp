@@ -3,6 +3,9 @@
 // flop/s counts the multiplications and additions of the products alone, bytes/s what must be read and
 // written.
 #include <benchmark/benchmark.h>
+#ifdef LUMEN_HAS_XSMM
+#include <libxsmm.h>
+#endif
 
 #include <cstring>
 
@@ -92,6 +95,31 @@ void ProductOuter(State& state) {
   CountFlops(state, ProductFlops(state));
 }
 
+#ifdef LUMEN_HAS_XSMM
+// libxsmm's kernel of a tile's product, in its column-major terms: y (kTile × outputs) = x (kTile × inputs)
+// by weight, which is stored as its transpose for one direction and as it is for the other.
+void XsmmProduct(State& state, int from, int to, bool transposed) {
+  const int rows = kTile, stored = transposed ? to : from;
+  const int flags = transposed ? LIBXSMM_GEMM_FLAG_TRANS_B : LIBXSMM_GEMM_FLAG_NONE;
+  const float alpha = 1, beta = 0;
+  const libxsmm_smmfunction kernel =
+      libxsmm_smmdispatch(rows, to, from, &rows, &stored, &rows, &alpha, &beta, &flags, nullptr);
+  if (!kernel) return state.SkipWithError("libxsmm has no kernel of this shape");
+  LineVector<float> weight(size_t(from) * to);
+  FillRandom(&weight, 1);
+  const Panel<float> x = RandomPanel(from, kTiles);
+  Panel<float> y(to, kTiles);
+  for (auto _ : state) {
+    for (int t = 0; t < kTiles; ++t) kernel(x.Tile(t), weight.data(), y.Tile(t));
+    benchmark::DoNotOptimize(y.Tile(0));
+    benchmark::ClobberMemory();
+  }
+  CountFlops(state, ProductFlops(state));
+}
+void XsmmForward(State& state) { XsmmProduct(state, int(state.range(1)), int(state.range(0)), false); }
+void XsmmBackward(State& state) { XsmmProduct(state, int(state.range(0)), int(state.range(1)), true); }
+#endif
+
 using Rows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
 void EigenForward(State& state) {
@@ -127,6 +155,10 @@ BENCHMARK(ProductForward)->Apply(Shapes);
 BENCHMARK(EigenForward)->Apply(Shapes);
 BENCHMARK(ProductBackward)->Apply(Shapes);
 BENCHMARK(ProductOuter)->Apply(Shapes);
+#ifdef LUMEN_HAS_XSMM
+BENCHMARK(XsmmForward)->Apply(Shapes);
+BENCHMARK(XsmmBackward)->Apply(Shapes);
+#endif
 BENCHMARK(EigenOuter)->Apply(Shapes);
 
 void StreamCopy(State& state) {
