@@ -198,7 +198,8 @@ TEST(Shading, DerivativesMatchFiniteDifferences) {
   light.sources.push_back({Vec3d(3, 0.5, 0), Vec3d(0, 0, 1), 2.7, Vec3d(900, 800, 700)});
   light.sources.push_back({Vec3d(-2, 2, 1), Vec3d(0.1, 0, 1).normalized(), 1.1, Vec3d(300, 500, 400)});
   const Vec3d point(4, -6, 20);
-  for (Reflectance kind : {Reflectance::kLambertian, Reflectance::kFree, Reflectance::kUnlit}) {
+  for (Reflectance kind :
+       {Reflectance::kLambertian, Reflectance::kCoat, Reflectance::kFree, Reflectance::kUnlit}) {
     Vec3d output(-0.5, -1, 0.2), normal = Vec3d(-0.2, 0.4, -1).normalized();
     Vec3d ambient(0.3, 0.2, 0.1);
     const Shading<double> shading = Shade(kind, output, normal, light, point, ambient);
@@ -242,6 +243,7 @@ class RayLossGradient : public testing::TestWithParam<LookOfWall> {};
 
 TEST_P(RayLossGradient, MatchesFiniteDifferences) {
   FieldOptions options = SmallField(GetParam().reflectance, GetParam().interreflection);
+  options.coat.learn_ior = GetParam().interreflection == Interreflection::kNone;
   if (GetParam().as_paper) {
     options.grid.levels = 0;
     options.place_octaves = 2;
@@ -259,7 +261,8 @@ TEST_P(RayLossGradient, MatchesFiniteDifferences) {
   field.Initialise(1, parameters.data());
   uint64_t state = 31;
   for (double& p : parameters) p += 0.05 * Random(state);
-  if (field.has_ambient()) parameters.back() = -0.3;  // so that the light between walls counts
+  if (field.has_ambient())
+    parameters[field.ambient_bias_begin() + 2] = -0.3;  // so that the light between walls counts
 
   Light light;
   light.sources.push_back({Vec3d(1, 0.5, 0), Vec3d::UnitZ(), 2.0, Vec3d(300, 200, 150)});
@@ -335,7 +338,25 @@ TEST_P(RayLossGradient, MatchesFiniteDifferences) {
   if (GetParam().reflectance != Reflectance::kUnlit) {
     EXPECT_NEAR(gain_gradient, Difference(loss, &log_gain[0]), 1e-7);
   }
-  if (GetParam().reflectance != Reflectance::kLambertian) return;
+  if (!HasAlbedo(GetParam().reflectance)) return;
+  if (field.has_coat()) {
+    // Without weight it is the diffuse wall, to the last bit.
+    FieldOptions diffuse = options;
+    diffuse.reflectance = Reflectance::kLambertian;
+    const Field<double> bare(diffuse, initial, kBox);
+    RayLoss<double> bare_loss(&bare);
+    const double weight = parameters[field.coat_begin()];
+    EXPECT_NE(
+        bare_loss.Evaluate(parameters.data(), batch, lights, log_gain, settings, unused.data(), &unused_gain)
+            .Sum(),
+        loss());
+    parameters[field.coat_begin()] = -1e4;
+    EXPECT_EQ(
+        bare_loss.Evaluate(parameters.data(), batch, lights, log_gain, settings, unused.data(), &unused_gain)
+            .Sum(),
+        loss());
+    parameters[field.coat_begin()] = weight;
+  }
   // The pulls act on the networks that put the numbers out and not on the weights of the samples.
   const size_t color_end = field.color_bias_begin() + 3;
   const std::vector<double> without = gradient;
@@ -350,7 +371,8 @@ TEST_P(RayLossGradient, MatchesFiniteDifferences) {
   EXPECT_GT(pulled, 1e-6);
   for (size_t i = color_end - 3; i < color_end; ++i) EXPECT_NEAR(gradient[i], without[i], 1e-12);
   if (!field.has_ambient()) return;
-  for (size_t i = gradient.size() - 3; i < gradient.size(); ++i) EXPECT_NEAR(gradient[i], without[i], 1e-12);
+  for (size_t i = field.ambient_bias_begin(); i < gradient.size(); ++i)
+    EXPECT_NEAR(gradient[i], without[i], 1e-12);
   // Channels weighted by trust: the gradient is that of each channel alone times its weight, which the losses
   // of a channel alone say.
   settings.albedo_weight = settings.ambient_weight = settings.eikonal_weight = 0;
@@ -489,6 +511,8 @@ INSTANTIATE_TEST_SUITE_P(Looks, RayLossGradient,
                          testing::Values(LookOfWall{Reflectance::kLambertian, Interreflection::kNone},
                                          LookOfWall{Reflectance::kLambertian, Interreflection::kMean},
                                          LookOfWall{Reflectance::kLambertian, Interreflection::kRadiosity},
+                                         LookOfWall{Reflectance::kCoat, Interreflection::kNone},
+                                         LookOfWall{Reflectance::kCoat, Interreflection::kRadiosity},
                                          LookOfWall{Reflectance::kFree, Interreflection::kNone},
                                          LookOfWall{Reflectance::kUnlit, Interreflection::kNone},
                                          LookOfWall{Reflectance::kFree, Interreflection::kNone, true},

@@ -109,10 +109,10 @@ std::vector<TrainKnob> TrainKnobsOf(const TrainOptions& own, int available_frame
   knobs.push_back(NumberKnob("binning", own, pick({1, 2}, {1, 2, 3, 4, 8}), own.binning,
                              [](double n, TrainOptions* o) { o->binning = static_cast<int>(n); }));
   if (own.field.reflectance != Reflectance::kUnlit) {
-    knobs.push_back(ChoiceKnob<Reflectance>("reflectance", own, {"lambertian", "free"},
+    knobs.push_back(ChoiceKnob<Reflectance>("reflectance", own, {"lambertian", "free", "coat"},
                                             [](TrainOptions* o) { return &o->field.reflectance; }));
   }
-  if (own.field.reflectance == Reflectance::kLambertian) {
+  if (HasAlbedo(own.field.reflectance)) {
     knobs.push_back(ChoiceKnob<Interreflection>("interreflection", own, {"none", "mean", "radiosity"},
                                                 [](TrainOptions* o) { return &o->field.interreflection; }));
   }

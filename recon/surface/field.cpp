@@ -12,15 +12,13 @@ MlpShape SdfShape(const FieldOptions& options) {
 }
 
 MlpShape ColorShape(const FieldOptions& options) {
-  const int view = options.reflectance == Reflectance::kLambertian
-                       ? 0
-                       : 6 + Frequency<float>(options.direction_octaves).outputs();
+  const int view =
+      HasAlbedo(options.reflectance) ? 0 : 6 + Frequency<float>(options.direction_octaves).outputs();
   return {options.features + 3 + view, options.color_hidden, 3, Activation::kRelu};
 }
 
 MlpShape AmbientShape(const FieldOptions& options) {
-  const bool none =
-      options.interreflection == Interreflection::kNone || options.reflectance != Reflectance::kLambertian;
+  const bool none = options.interreflection == Interreflection::kNone || !HasAlbedo(options.reflectance);
   if (none) return {0, {}, 0, Activation::kSquareplus};
   return {3, options.ambient_hidden, 3, Activation::kSquareplus};
 }
@@ -63,11 +61,11 @@ void Field<T>::Initialise(uint64_t seed, T* parameters) const {
     sdf_.Initialise(seed * 3 + 1, kSdfStart, parameters + grid_size());
   }
   color_.Initialise(seed * 3 + 2, kColorStart, parameters + grid_size() + sdf_.parameter_count());
+  if (has_coat()) InitialiseCoat(options_.coat, parameters + coat_begin());
   if (!has_ambient()) return;
   T* ambient = parameters + grid_size() + sdf_.parameter_count() + color_.parameter_count();
   ambient_.Initialise(seed * 3 + 3, kColorStart, ambient);
-  const double start =
-      options_.interreflection == Interreflection::kRadiosity ? kRadiosityStart : kMeanStart;
+  const double start = options_.interreflection == Interreflection::kRadiosity ? kRadiosityStart : kMeanStart;
   std::fill_n(parameters + ambient_bias_begin(), 3, static_cast<T>(start));
 }
 

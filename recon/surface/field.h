@@ -14,6 +14,7 @@
 #include "recon/network/mlp.h"
 #include "recon/network/weight_norm.h"
 #include "recon/surface/initial_surface.h"
+#include "recon/surface/mucus_coat.h"
 
 namespace lumen {
 
@@ -21,8 +22,14 @@ namespace lumen {
 enum class Reflectance {
   kLambertian,  // log albedo of a wall whose shading is known: albedo/π · irradiance · cos
   kFree,        // log of BRDF · cos, a function of place, direction and normal: the paper's network
+  kCoat,        // kLambertian's under a coat of mucus, whose numbers are learnt
   kUnlit,       // the pixel's own value, no light modelled: NeuS
 };
+
+// Whether the outputs are the log albedo of a wall that scatters light diffusely.
+inline bool HasAlbedo(Reflectance reflectance) {
+  return reflectance == Reflectance::kLambertian || reflectance == Reflectance::kCoat;
+}
 
 // What the wall receives from the rest of the wall.
 enum class Interreflection {
@@ -44,7 +51,8 @@ struct FieldOptions {
   int features = 15;  // numbers that the distance network hands to the colour network
   double unit_mm = 68;
   Reflectance reflectance = Reflectance::kLambertian;
-  Interreflection interreflection = Interreflection::kRadiosity;  // of a kLambertian wall; others: none
+  MucusCoatOptions coat;                                          // of a kCoat wall
+  Interreflection interreflection = Interreflection::kRadiosity;  // of a wall that HasAlbedo; others: none
   std::vector<int> ambient_hidden = {16};
 };
 
@@ -54,10 +62,10 @@ class Field {
   // box: where the surface may lie, relative to the origin.
   Field(const FieldOptions& options, const InitialSurface& initial, const Eigen::AlignedBox3d& box);
 
-  // Parameters: the grid's tables first, then the networks'.
+  // Parameters: the grid's tables first, then the networks', the coat's last.
   size_t grid_size() const { return grid_.parameter_count(); }
   size_t network_size() const {
-    return sdf_.parameter_count() + color_.parameter_count() + ambient_.parameter_count();
+    return sdf_.parameter_count() + color_.parameter_count() + ambient_.parameter_count() + coat_size();
   }
   size_t parameter_count() const { return grid_size() + network_size(); }
   const Grid<T>& grid() const { return grid_; }
@@ -71,8 +79,11 @@ class Field {
     return grid_size() + sdf_.parameter_count() + color_.parameter_count() - 3;
   }
   // Likewise of the ambient network's, if the field has_ambient.
-  size_t ambient_bias_begin() const { return parameter_count() - 3; }
+  size_t ambient_bias_begin() const { return coat_begin() - 3; }
   bool has_ambient() const { return ambient_.parameter_count() > 0; }
+  // Likewise of the coat's numbers (LearntCoat), if the field has_coat.
+  size_t coat_begin() const { return parameter_count() - coat_size(); }
+  bool has_coat() const { return options_.reflectance == Reflectance::kCoat; }
 
   // Signed distances alone, of all tiles of positions.
   struct ValuePass {
@@ -124,7 +135,8 @@ class Field {
 
  private:
   void FillOutputDelta(SurfacePass* pass) const;
-  bool sees_view() const { return options_.reflectance != Reflectance::kLambertian; }
+  bool sees_view() const { return !HasAlbedo(options_.reflectance); }
+  size_t coat_size() const { return has_coat() ? static_cast<size_t>(CoatParameters(options_.coat)) : 0; }
   // Rows of the distance network's input before the three of place.
   int encoded() const { return grid_.outputs() + place_frequency_.outputs(); }
   // The base that the network's output is added to, and its gradient unless null.

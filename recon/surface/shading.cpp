@@ -31,11 +31,11 @@ Shading<T> Shade(Reflectance reflectance, const Vec3<T>& output, const Vec3<T>& 
     }
     return result;
   }
-  const bool lambertian = reflectance == Reflectance::kLambertian;
+  const bool has_albedo = HasAlbedo(reflectance);
   Vec3<T> incident = Vec3<T>::Zero();
   for (const auto& source : light.sources) {
     const Irradiance<T> irradiance = IrradianceAt(source.position, source.direction, source.spread, point);
-    if (!lambertian) {
+    if (!has_albedo) {
       incident += irradiance.per_intensity * source.intensity;
       continue;
     }
@@ -45,8 +45,8 @@ Shading<T> Shade(Reflectance reflectance, const Vec3<T>& output, const Vec3<T>& 
     result.by_normal += irradiance.per_intensity * source.intensity * irradiance.toward.transpose();
   }
   for (int c = 0; c < 3; ++c) {
-    const T reflected = std::exp(output[c]) * (lambertian ? T(1 / kPi) : T(1));
-    if (lambertian) result.ambient[c] = reflected * ambient[c];
+    const T reflected = std::exp(output[c]) * (has_albedo ? T(1 / kPi) : T(1));
+    if (has_albedo) result.ambient[c] = reflected * ambient[c];
     result.radiance[c] = reflected * incident[c] + result.ambient[c];
     result.by_normal.row(c) *= reflected;
   }

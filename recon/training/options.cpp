@@ -89,7 +89,7 @@ const std::vector<std::string> kShapeNames = {"tube", "sphere"};
 const std::vector<std::string> kSamplerNames = {"guided", "importance"};
 const std::vector<std::string> kDecayNames = {"exponential", "cosine"};
 const std::vector<std::string> kPrecisionNames = {"float", "bf16"};
-const char* const kReflectanceNames[] = {"lambertian", "free", "unlit"};
+const char* const kReflectanceNames[] = {"lambertian", "free", "coat", "unlit"};
 const char* const kInterreflectionNames[] = {"none", "mean", "radiosity"};
 
 std::vector<int> Widths(const ConfigTable& table, const std::string& key, const std::vector<int>& otherwise) {
@@ -124,9 +124,11 @@ void ReadField(const ConfigTable& root, FieldOptions* field) {
     field->features = static_cast<int>(network->Integer("features", field->features, {0, 1024}));
     field->unit_mm = network->Number("unit_mm", field->unit_mm, kPositive);
     const std::string name = network->Choice("reflectance", kReflectanceNames[int(field->reflectance)],
-                                             {kReflectanceNames, kReflectanceNames + 3});
-    for (int i = 0; i < 3; ++i)
+                                             {kReflectanceNames, kReflectanceNames + 4});
+    for (int i = 0; i < 4; ++i)
       if (name == kReflectanceNames[i]) field->reflectance = static_cast<Reflectance>(i);
+    field->coat.ior = network->Number("coat_ior", field->coat.ior, {1.01, 1.99});
+    field->coat.learn_ior = network->Flag("coat_ior_learnt", field->coat.learn_ior);
     const std::string source =
         network->Choice("interreflection", kInterreflectionNames[int(field->interreflection)],
                         {kInterreflectionNames, kInterreflectionNames + 3});
@@ -275,7 +277,8 @@ std::string FormatTrainOptions(const TrainOptions& o) {
       << "\ndirection_octaves = " << o.field.direction_octaves
       << "\ncolor_hidden = " << Array(o.field.color_hidden) << "\nfeatures = " << o.field.features
       << "\nunit_mm = " << o.field.unit_mm << "\nreflectance = \""
-      << kReflectanceNames[int(o.field.reflectance)] << "\"\ninterreflection = \""
+      << kReflectanceNames[int(o.field.reflectance)] << "\"\ncoat_ior = " << o.field.coat.ior
+      << "\ncoat_ior_learnt = " << (o.field.coat.learn_ior ? "true" : "false") << "\ninterreflection = \""
       << kInterreflectionNames[int(o.field.interreflection)]
       << "\"\nambient_hidden = " << Array(o.field.ambient_hidden) << "\n\n[initial]\nshape = \""
       << kShapeNames[int(o.field.initial.shape)] << "\"\nradius_mm = " << o.field.initial.radius_mm

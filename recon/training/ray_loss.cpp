@@ -88,6 +88,12 @@ void RayLoss<T>::ShadeActive(const T* parameters, const RayBatch<T>& batch,
   field_->Color(parameters, &surface_);
   const Panel<T>& output = surface_.color_output();
   shading_.resize(count);
+  const bool has_coat = field_->has_coat();
+  MucusCoat<T> coat;
+  if (has_coat) {
+    coat = LearntCoat(field_->options().coat, parameters + field_->coat_begin());
+    by_coat_.resize(count);
+  }
   for (int i = 0; i < count; ++i) {
     const Active& sample = active_[i];
     if (!(sample.weight > 0)) continue;
@@ -103,11 +109,13 @@ void RayLoss<T>::ShadeActive(const T* parameters, const RayBatch<T>& batch,
     } else if (field_->has_ambient()) {
       // What the pixels show of the other places holds the frame's gain already.
       ambient = T(kPi) * lights[frame].mean_radiance;
-      for (int c = 0; c < 3; ++c) ambient[c] *= std::exp(surface_.ambient_output().At(c, i) - log_gain[frame]);
+      for (int c = 0; c < 3; ++c)
+        ambient[c] *= std::exp(surface_.ambient_output().At(c, i) - log_gain[frame]);
     }
-    shading_[i] =
-        Shade(field_->options().reflectance, Vec3<T>(output.At(0, i), output.At(1, i), output.At(2, i)),
-              normal, lights[frame], point, ambient);
+    const Vec3<T> color(output.At(0, i), output.At(1, i), output.At(2, i));
+    shading_[i] = has_coat
+                      ? ShadeCoated(coat, color, normal, lights[frame], point, ambient, &by_coat_[i])
+                      : Shade(field_->options().reflectance, color, normal, lights[frame], point, ambient);
   }
 }
 
@@ -233,6 +241,7 @@ LossTerms RayLoss<T>::Evaluate(const T* parameters, const RayBatch<T>& batch,
   terms.photometric = ComparePixels(batch, log_gain, settings, log_gain_gradient);
   BackToSamples(batch, settings, &terms);
   field_->ColorBackward(parameters, &surface_, network_gradient);
+  if (field_->has_coat()) CoatBackward(parameters, network_gradient);
   if (pose_gradient) AddPoseGradient(parameters, batch, pose_gradient);
 
   const T eikonal_share = settings.eikonal_weight * settings.per_ray / T(batch.samples);
@@ -254,6 +263,21 @@ LossTerms RayLoss<T>::Evaluate(const T* parameters, const RayBatch<T>& batch,
   }
   field_->SurfaceBackward(parameters, &surface_, network_gradient);
   return terms;
+}
+
+template <class T>
+void RayLoss<T>::CoatBackward(const T* parameters, T* network_gradient) const {
+  MucusCoat<T> delta{0, 0, 0};
+  for (size_t i = 0; i < active_.size(); ++i) {
+    if (!(active_[i].weight > 0)) continue;
+    const Vec3<T> by_radiance = active_[i].weight * radiance_delta_[active_[i].ray];
+    delta.weight += by_radiance.dot(by_coat_[i].weight);
+    delta.roughness += by_radiance.dot(by_coat_[i].roughness);
+    delta.ior += by_radiance.dot(by_coat_[i].ior);
+  }
+  const size_t begin = field_->coat_begin();
+  LearntCoatBackward(field_->options().coat, parameters + begin, delta,
+                     network_gradient + (begin - field_->grid_size()));
 }
 
 // Samples keep their places in the camera's axes, and so the light that comes to them from the moving guides.

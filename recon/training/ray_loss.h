@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "recon/surface/field.h"
+#include "recon/surface/mucus_coat.h"
 #include "recon/surface/shading.h"
 #include "recon/training/loss.h"
 
@@ -43,7 +44,7 @@ struct LossSettings {
   T sharpness;      // s, 1/mm
   T inverse_gamma;  // of the comparison
   T eikonal_weight;
-  T albedo_weight;   // of the pull of the albedo to the batch's mean; kLambertian only
+  T albedo_weight;   // of the pull of the albedo to the batch's mean, where there is one
   T albedo_width;    // of its Huber loss, in log
   T ambient_weight;  // of the same pull on the log ambient factor
   T ambient_doubt;   // of ChannelTrust
@@ -102,6 +103,7 @@ class RayLoss {
   double ComparePixels(const RayBatch<T>& batch, const std::vector<T>& log_gain,
                        const LossSettings<T>& settings, T* log_gain_gradient);
   double Pull(T strength, T width, const Panel<T>& output, int row, Panel<T>* delta);
+  void CoatBackward(const T* parameters, T* network_gradient) const;
   void AddPoseGradient(const T* parameters, const RayBatch<T>& batch, T* pose_gradient);
   void BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& settings, LossTerms* terms);
 
@@ -113,6 +115,7 @@ class RayLoss {
   std::vector<Vec3<T>> radiance_delta_;  // a ray
   std::vector<Active> active_;
   std::vector<Shading<T>> shading_;  // an active sample
+  std::vector<ByCoat<T>> by_coat_;   // likewise, if the field has_coat
   std::vector<Term<T>> pull_;        // on one of its outputs
   Panel<T> positions_delta_;
   LineVector<T> unused_gradient_;

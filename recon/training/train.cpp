@@ -48,8 +48,8 @@ double SecondsSince(Clock::time_point start) {
 // walls that is free at every place explains any frame, on any surface: the surface then leaves through the
 // bounds.
 TrainOptions ForFrames(TrainOptions options, int taken) {
-  const bool free_ambient = options.field.reflectance == Reflectance::kLambertian &&
-                            options.field.interreflection == Interreflection::kMean;
+  const bool free_ambient =
+      HasAlbedo(options.field.reflectance) && options.field.interreflection == Interreflection::kMean;
   if (taken > 1) return options;
   options.schedule.fog_iterations = 0;
   if (!free_ambient) return options;

@@ -166,10 +166,10 @@ LossSettings<float> Trainer::SettingsAt(double progress) const {
                                                                       : SharpnessAt(progress));
   settings.inverse_gamma = static_cast<float>(frames_.inverse_gamma());
   settings.eikonal_weight = static_cast<float>(options_.loss.eikonal);
-  const bool lambertian = options_.field.reflectance == Reflectance::kLambertian;
   settings.albedo_weight =
-      lambertian ? static_cast<float>(options_.loss.albedo * std::pow(options_.loss.albedo_final, progress))
-                 : 0.0f;
+      HasAlbedo(options_.field.reflectance)
+          ? static_cast<float>(options_.loss.albedo * std::pow(options_.loss.albedo_final, progress))
+          : 0.0f;
   settings.albedo_width = static_cast<float>(options_.loss.albedo_width);
   settings.ambient_weight = static_cast<float>(options_.loss.ambient);
   settings.ambient_doubt = static_cast<float>(options_.loss.ambient_doubt);
