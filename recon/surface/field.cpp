@@ -61,12 +61,21 @@ void Field<T>::Initialise(uint64_t seed, T* parameters) const {
     sdf_.Initialise(seed * 3 + 1, kSdfStart, parameters + grid_size());
   }
   color_.Initialise(seed * 3 + 2, kColorStart, parameters + grid_size() + sdf_.parameter_count());
+  if (learns_power()) parameters[power_begin()] = 0;
   if (has_coat()) InitialiseCoat(options_.coat, parameters + coat_begin());
   if (!has_ambient()) return;
   T* ambient = parameters + grid_size() + sdf_.parameter_count() + color_.parameter_count();
   ambient_.Initialise(seed * 3 + 3, kColorStart, ambient);
   const double start = options_.interreflection == Interreflection::kRadiosity ? kRadiosityStart : kMeanStart;
   std::fill_n(parameters + ambient_bias_begin(), 3, static_cast<T>(start));
+}
+
+template <class T>
+T Field<T>::OutputOfLogAlbedo(T log_albedo) const {
+  if (!bounds_albedo()) return log_albedo;
+  constexpr double kPalestStart = 0.9;  // where the slope by the output still is a tenth
+  const T albedo = std::min(std::exp(log_albedo), T(kPalestStart));
+  return std::log(albedo / (1 - albedo));
 }
 
 template <class T>

@@ -15,6 +15,7 @@
 #include "recon/network/weight_norm.h"
 #include "recon/surface/initial_surface.h"
 #include "recon/surface/mucus_coat.h"
+#include "recon/surface/volume.h"
 
 namespace lumen {
 
@@ -51,6 +52,12 @@ struct FieldOptions {
   int features = 15;  // numbers that the distance network hands to the colour network
   double unit_mm = 68;
   Reflectance reflectance = Reflectance::kLambertian;
+  // Of radiosity alone: albedo = sigmoid(output) rather than its exponential. Elsewhere an albedo has to have
+  // headroom for the light between walls that isn't modelled.
+  bool bound_albedo = false;
+  // Whether one factor of all that is seen, the guides' power times the gain, is learnt beside a bounded
+  // albedo.
+  bool learn_power = false;
   MucusCoatOptions coat;                                          // of a kCoat wall
   Interreflection interreflection = Interreflection::kRadiosity;  // of a wall that HasAlbedo; others: none
   std::vector<int> ambient_hidden = {16};
@@ -65,7 +72,8 @@ class Field {
   // Parameters: the grid's tables first, then the networks', the coat's last.
   size_t grid_size() const { return grid_.parameter_count(); }
   size_t network_size() const {
-    return sdf_.parameter_count() + color_.parameter_count() + ambient_.parameter_count() + coat_size();
+    return sdf_.parameter_count() + color_.parameter_count() + ambient_.parameter_count() + power_size() +
+           coat_size();
   }
   size_t parameter_count() const { return grid_size() + network_size(); }
   const Grid<T>& grid() const { return grid_; }
@@ -79,8 +87,22 @@ class Field {
     return grid_size() + sdf_.parameter_count() + color_.parameter_count() - 3;
   }
   // Likewise of the ambient network's, if the field has_ambient.
-  size_t ambient_bias_begin() const { return coat_begin() - 3; }
+  size_t ambient_bias_begin() const { return power_begin() - 3; }
   bool has_ambient() const { return ambient_.parameter_count() > 0; }
+  bool bounds_albedo() const {
+    return options_.bound_albedo && HasAlbedo(options_.reflectance) &&
+           options_.interreflection == Interreflection::kRadiosity;
+  }
+  // Likewise of the power's logarithm, if the field learns_power.
+  size_t power_begin() const { return coat_begin() - power_size(); }
+  bool learns_power() const { return bounds_albedo() && options_.learn_power; }
+  // Log albedo of what the colour network puts out, where there is an albedo, with the derivative.
+  T LogAlbedo(T output, T* slope = nullptr) const {
+    if (slope) *slope = bounds_albedo() ? Sigmoid(-output) : T(1);
+    return bounds_albedo() ? LogSigmoid(output) : output;
+  }
+  // And the output that has it: of albedos that a bounded one can't reach, the nearest that starts well.
+  T OutputOfLogAlbedo(T log_albedo) const;
   // Likewise of the coat's numbers (LearntCoat), if the field has_coat.
   size_t coat_begin() const { return parameter_count() - coat_size(); }
   bool has_coat() const { return options_.reflectance == Reflectance::kCoat; }
@@ -136,6 +158,7 @@ class Field {
  private:
   void FillOutputDelta(SurfacePass* pass) const;
   bool sees_view() const { return !HasAlbedo(options_.reflectance); }
+  size_t power_size() const { return learns_power() ? 1 : 0; }
   size_t coat_size() const { return has_coat() ? static_cast<size_t>(CoatParameters(options_.coat)) : 0; }
   // Rows of the distance network's input before the three of place.
   int encoded() const { return grid_.outputs() + place_frequency_.outputs(); }

@@ -5,6 +5,7 @@
 
 #include "common/config.h"
 #include "common/error.h"
+#include "common/files.h"
 
 namespace lumen {
 namespace {
@@ -127,6 +128,7 @@ void ReadField(const ConfigTable& root, FieldOptions* field) {
                                              {kReflectanceNames, kReflectanceNames + 4});
     for (int i = 0; i < 4; ++i)
       if (name == kReflectanceNames[i]) field->reflectance = static_cast<Reflectance>(i);
+    field->bound_albedo = network->Flag("bound_albedo", field->bound_albedo);
     field->coat.ior = network->Number("coat_ior", field->coat.ior, {1.01, 1.99});
     field->coat.learn_ior = network->Flag("coat_ior_learnt", field->coat.learn_ior);
     const std::string source =
@@ -261,6 +263,19 @@ TrainOptions ReadTrainOptions(const std::string& name, const std::vector<std::st
   throw InputError("--preset " + name + ": no such preset; there are: " + known);
 }
 
+RunOptions ReadRunOptions(const std::filesystem::path& file) {
+  RunOptions run;
+  run.text = ReadFile(file);
+  const Config config = Config::Parse(run.text, file.string());
+  run.seed = static_cast<uint64_t>(config.root().Integer("seed"));
+  run.train.preset = config.root().String("preset");
+  ReadField(config.root(), &run.train.field);
+  ReadRest(config.root(), &run.train);
+  config.RejectUnknown();
+  RequireFit(run.train);
+  return run;
+}
+
 std::string FormatTrainOptions(const TrainOptions& o) {
   std::ostringstream out;
   out.precision(17);
@@ -277,7 +292,9 @@ std::string FormatTrainOptions(const TrainOptions& o) {
       << "\ndirection_octaves = " << o.field.direction_octaves
       << "\ncolor_hidden = " << Array(o.field.color_hidden) << "\nfeatures = " << o.field.features
       << "\nunit_mm = " << o.field.unit_mm << "\nreflectance = \""
-      << kReflectanceNames[int(o.field.reflectance)] << "\"\ncoat_ior = " << o.field.coat.ior
+      << kReflectanceNames[int(o.field.reflectance)]
+      << "\"\nbound_albedo = " << (o.field.bound_albedo ? "true" : "false")
+      << "\ncoat_ior = " << o.field.coat.ior
       << "\ncoat_ior_learnt = " << (o.field.coat.learn_ior ? "true" : "false") << "\ninterreflection = \""
       << kInterreflectionNames[int(o.field.interreflection)]
       << "\"\nambient_hidden = " << Array(o.field.ambient_hidden) << "\n\n[initial]\nshape = \""

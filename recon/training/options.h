@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <string>
 #include <vector>
 
@@ -98,6 +99,15 @@ std::vector<std::string> PresetNames();
 // A preset with the command line's settings ("loss.eikonal=0.05") on top. Throws InputError: no such preset,
 // unknown key, value out of range.
 TrainOptions ReadTrainOptions(const std::string& preset, const std::vector<std::string>& settings);
+
+// What a run was started with, as its config.toml says.
+struct RunOptions {
+  std::string text;  // of the file
+  uint64_t seed = 0;
+  TrainOptions train;
+};
+// Throws InputError as ReadTrainOptions does, and where the file can't be read.
+RunOptions ReadRunOptions(const std::filesystem::path& file);
 
 // All of it as TOML, as RUN/config.toml shows it.
 std::string FormatTrainOptions(const TrainOptions& options);

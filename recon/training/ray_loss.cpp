@@ -86,7 +86,8 @@ void RayLoss<T>::ShadeActive(const T* parameters, const RayBatch<T>& batch,
     for (int d = 0; d < 3; ++d) surface_.normal.At(d, i) = gradient[d];
   }
   field_->Color(parameters, &surface_);
-  const Panel<T>& output = surface_.color_output();
+  if (field_->bounds_albedo()) BoundAlbedo(surface_.color_output());
+  const Panel<T>& output = field_->bounds_albedo() ? log_albedo_ : surface_.color_output();
   shading_.resize(count);
   const bool has_coat = field_->has_coat();
   MucusCoat<T> coat;
@@ -117,6 +118,62 @@ void RayLoss<T>::ShadeActive(const T* parameters, const RayBatch<T>& batch,
                       ? ShadeCoated(coat, color, normal, lights[frame], point, ambient, &by_coat_[i])
                       : Shade(field_->options().reflectance, color, normal, lights[frame], point, ambient);
   }
+  if (field_->learns_power()) ScaleByPower(std::exp(parameters[field_->power_begin()]));
+}
+
+template <class T>
+std::vector<typename RayLoss<T>::Wall> RayLoss<T>::LookAtLast(const T* parameters, const RayBatch<T>& batch,
+                                                              const std::vector<FrameLight<T>>& lights,
+                                                              const std::vector<T>& log_gain) {
+  active_.clear();
+  for (size_t r = 0; r < batch.rays.size(); ++r)
+    active_.push_back({static_cast<int>(r), batch.samples - 1, T(1), T(0)});
+  ShadeActive(parameters, batch, lights, log_gain);
+  std::vector<Wall> walls(active_.size());
+  for (size_t i = 0; i < active_.size(); ++i) {
+    for (int c = 0; c < 3; ++c)
+      walls[i].albedo[c] = std::exp(field_->LogAlbedo(surface_.color_output().At(c, static_cast<int>(i))));
+    walls[i].direct = shading_[i].by_output - shading_[i].ambient;
+    walls[i].indirect = shading_[i].ambient;
+    walls[i].beyond = surface_.free.At(0, static_cast<int>(i)) == 0;
+  }
+  return walls;
+}
+
+template <class T>
+void RayLoss<T>::BoundAlbedo(const Panel<T>& output) {
+  log_albedo_.Resize(3, output.tiles());
+  log_albedo_slope_.Resize(3, output.tiles());
+  for (int i = 0; i < output.tiles() * kTile; ++i)
+    for (int c = 0; c < 3; ++c)
+      log_albedo_.At(c, i) = field_->LogAlbedo(output.At(c, i), &log_albedo_slope_.At(c, i));
+}
+
+template <class T>
+void RayLoss<T>::ScaleByPower(T power) {
+  for (size_t i = 0; i < active_.size(); ++i) {
+    if (!(active_[i].weight > 0)) continue;
+    Shading<T>& shading = shading_[i];
+    shading.radiance *= power;
+    shading.by_output *= power;
+    shading.by_normal *= power;
+    shading.ambient *= power;
+    if (!field_->has_coat()) continue;
+    by_coat_[i].weight *= power;
+    by_coat_[i].roughness *= power;
+    by_coat_[i].ior *= power;
+  }
+}
+
+template <class T>
+void RayLoss<T>::PowerBackward(T* network_gradient) const {
+  T by_log_power = 0;
+  for (size_t i = 0; i < active_.size(); ++i) {
+    const Active& sample = active_[i];
+    if (sample.weight > 0)
+      by_log_power += sample.weight * radiance_delta_[sample.ray].dot(shading_[i].radiance);
+  }
+  network_gradient[field_->power_begin() - field_->grid_size()] += by_log_power;
 }
 
 template <class T>
@@ -176,13 +233,16 @@ void RayLoss<T>::BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& 
       surface_.ambient_delta.At(c, i) = delta[c] * sample.weight * shading_[i].ambient[c];
     }
   }
+  const bool bounded = field_->bounds_albedo();
   if (settings.albedo_weight > 0) {
+    const Panel<T>& log_albedo = bounded ? log_albedo_ : surface_.color_output();
     const T strength = settings.albedo_weight * settings.per_ray / 3;
     for (int c = 0; c < 3; ++c) {
-      terms->albedo +=
-          Pull(strength, settings.albedo_width, surface_.color_output(), c, &surface_.color_delta);
+      terms->albedo += Pull(strength, settings.albedo_width, log_albedo, c, &surface_.color_delta);
     }
   }
+  for (size_t i = 0; bounded && i < active_.size(); ++i)
+    for (int c = 0; c < 3; ++c) surface_.color_delta.At(c, i) *= log_albedo_slope_.At(c, i);
   if (field_->has_ambient()) {
     const T strength = settings.ambient_weight * settings.per_ray / 3;
     for (int c = 0; c < 3; ++c) {
@@ -242,6 +302,7 @@ LossTerms RayLoss<T>::Evaluate(const T* parameters, const RayBatch<T>& batch,
   BackToSamples(batch, settings, &terms);
   field_->ColorBackward(parameters, &surface_, network_gradient);
   if (field_->has_coat()) CoatBackward(parameters, network_gradient);
+  if (field_->learns_power()) PowerBackward(network_gradient);
   if (pose_gradient) AddPoseGradient(parameters, batch, pose_gradient);
 
   const T eikonal_share = settings.eikonal_weight * settings.per_ray / T(batch.samples);

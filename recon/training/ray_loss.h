@@ -84,6 +84,14 @@ class RayLoss {
   LossTerms Evaluate(const T* parameters, const RayBatch<T>& batch, const std::vector<FrameLight<T>>& lights,
                      const std::vector<T>& log_gain, const LossSettings<T>& settings, T* network_gradient,
                      T* log_gain_gradient, T* pose_gradient = nullptr);
+  // What a place of the wall sends to the camera, without glints.
+  struct Wall {
+    Vec3<T> albedo, direct, indirect;
+    bool beyond;  // the bounds, where nothing is learnt
+  };
+  // Of each ray's last sample, which lies on the surface (MeetSurface). The field must have an albedo.
+  std::vector<Wall> LookAtLast(const T* parameters, const RayBatch<T>& batch,
+                               const std::vector<FrameLight<T>>& lights, const std::vector<T>& log_gain);
   void GridBackward(int level, T* grid_gradient) const {
     field_->GridBackward(level, surface_, static_cast<int>(active_.size()), grid_gradient);
   }
@@ -103,6 +111,9 @@ class RayLoss {
   double ComparePixels(const RayBatch<T>& batch, const std::vector<T>& log_gain,
                        const LossSettings<T>& settings, T* log_gain_gradient);
   double Pull(T strength, T width, const Panel<T>& output, int row, Panel<T>* delta);
+  void BoundAlbedo(const Panel<T>& output);
+  void ScaleByPower(T power);
+  void PowerBackward(T* network_gradient) const;
   void CoatBackward(const T* parameters, T* network_gradient) const;
   void AddPoseGradient(const T* parameters, const RayBatch<T>& batch, T* pose_gradient);
   void BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& settings, LossTerms* terms);
@@ -114,9 +125,10 @@ class RayLoss {
   std::vector<Vec3<T>> ambient_;         // a ray: the part of its radiance that the rest of the wall sends
   std::vector<Vec3<T>> radiance_delta_;  // a ray
   std::vector<Active> active_;
-  std::vector<Shading<T>> shading_;  // an active sample
-  std::vector<ByCoat<T>> by_coat_;   // likewise, if the field has_coat
-  std::vector<Term<T>> pull_;        // on one of its outputs
+  std::vector<Shading<T>> shading_;         // an active sample
+  std::vector<ByCoat<T>> by_coat_;          // likewise, if the field has_coat
+  std::vector<Term<T>> pull_;               // on one of its outputs
+  Panel<T> log_albedo_, log_albedo_slope_;  // of the colour network's outputs, if the field bounds_albedo
   Panel<T> positions_delta_;
   LineVector<T> unused_gradient_;
 };

@@ -18,9 +18,7 @@ constexpr int kCells = DirectionMap<float>::kCells, kEdge = DirectionMap<float>:
 constexpr int kGroupEdge = 2, kGroups = kCells / (kGroupEdge * kGroupEdge);
 static_assert(kEdge % kGroupEdge == 0);
 
-int GroupOf(int cell) {
-  return cell / kEdge / kGroupEdge * (kEdge / kGroupEdge) + cell % kEdge / kGroupEdge;
-}
+int GroupOf(int cell) { return cell / kEdge / kGroupEdge * (kEdge / kGroupEdge) + cell % kEdge / kGroupEdge; }
 
 }  // namespace
 
@@ -52,7 +50,7 @@ DirectionMap<float> SurroundingsOf(const Field<float>& field, const float* param
     const double cosine = std::max<double>(kShallowestCosine, -normal.dot(batch.rays[i].direction));
     const double distance = batch.distance[size_t(i + 1) * batch.samples - 1];
     patch.area_mm2 = double(DirectionMap<float>::SolidAngle(i)) * distance * distance / cosine;
-    patch.albedo = vector(pass.color_output(), i).array().exp().matrix().cast<double>();
+    for (int c = 0; c < 3; ++c) patch.albedo[c] = std::exp(field.LogAlbedo(pass.color_output().At(c, i)));
     patch.irradiance =
         kPi * Shade<float>(Reflectance::kLambertian, Vec3f::Zero(), normal, light, point, Vec3f::Zero())
                   .radiance.cast<double>();

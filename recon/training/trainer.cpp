@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "common/parallel.h"
 #include "common/random.h"
@@ -56,7 +57,11 @@ Trainer::Trainer(const TrainingFrames& frames, const TrainOptions& options, uint
     start.reach_mm = FitReach(frames, start, options.bounds.ahead_mm, RandomBits(seed, 0x7265616368ull));
   }
   const InitialSurface initial(start, frames.world_from_camera(), origin_);
-  field_ = std::make_unique<Field<float>>(options.field, initial, Eigen::AlignedBox3d(-half, half));
+  // Of guides whose power is unknown, or under gains of which none is known, an albedo has no scale of its
+  // own.
+  FieldOptions field = options.field;
+  field.learn_power = !frames.light().calibrated || frames.gains_relative();
+  field_ = std::make_unique<Field<float>>(field, initial, Eigen::AlignedBox3d(-half, half));
   for (const Pose& pose : frames.world_from_camera()) {
     lights_.push_back(LightOfFrame<float>(frames.light(), pose, origin_));
     if (!field_->has_ambient() || has_surroundings()) continue;
@@ -123,11 +128,20 @@ void Trainer::MatchColorsToInitialSurface(const InitialSurface& initial) {
     }
   }
   float* bias = &state_.parameters[field_->color_bias_begin()];
+  float palest = -std::numeric_limits<float>::infinity();
   for (int c = 0; c < 3; ++c) {
     if (log_ratio[c].empty()) continue;
     auto middle = log_ratio[c].begin() + static_cast<std::ptrdiff_t>(log_ratio[c].size() / 2);
     std::nth_element(log_ratio[c].begin(), middle, log_ratio[c].end());
     bias[c] = *middle;
+    palest = std::max(palest, *middle);
+  }
+  if (!field_->bounds_albedo()) return;
+  // The palest channel starts in the middle of its range where the power is free to make up for it.
+  const float log_power = field_->learns_power() && std::isfinite(palest) ? palest - std::log(0.5f) : 0.0f;
+  if (field_->learns_power()) state_.parameters[field_->power_begin()] = log_power;
+  for (int c = 0; c < 3; ++c) {
+    if (!log_ratio[c].empty()) bias[c] = field_->OutputOfLogAlbedo(bias[c] - log_power);
   }
 }
 

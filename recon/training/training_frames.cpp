@@ -175,6 +175,10 @@ void TrainingFrames::FindScale(const Sequence& sequence) {
 
 double TrainingFrames::LogGainReach(int frame) const { return frames_[frame].log_gain_reach; }
 
+bool TrainingFrames::gains_relative() const {
+  return std::ranges::all_of(frames_, [](const Frame& frame) { return std::isinf(frame.log_gain_reach); });
+}
+
 bool TrainingFrames::learns_first_gain() const {
   return std::isinf(frames_[0].log_gain_reach) &&
          std::ranges::any_of(frames_, [](const Frame& frame) { return std::isfinite(frame.log_gain_reach); });

@@ -45,6 +45,8 @@ class TrainingFrames {
   double LogGainReach(int frame) const;
   // Whether the first frame's gain is unknown and others' are not; if all are unknown, it is 1.
   bool learns_first_gain() const;
+  // Whether all gains are unknown, so that they are known up to a common factor only.
+  bool gains_relative() const;
   // Over the frames taken (HueSlope).
   double hue_slope() const { return hue_slope_; }
   // 1/γ of the comparison; for an sRGB response that of the 2.2 which approximates it.
