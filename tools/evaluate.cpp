@@ -1,5 +1,7 @@
 #include "recon/evaluation/evaluate.h"
 
+#include <algorithm>
+#include <cmath>
 #include <iostream>
 
 #include "common/files.h"
@@ -7,6 +9,7 @@
 #include "recon/evaluation/depth_error.h"
 #include "recon/evaluation/evaluation_json.h"
 #include "recon/evaluation/evaluation_table.h"
+#include "recon/evaluation/light_error.h"
 #include "recon/evaluation/sheet.h"
 #include "tools/options.h"
 #include "tools/sequence_arguments.h"
@@ -17,7 +20,7 @@ namespace {
 struct Arguments {
   std::filesystem::path mesh, folder;
   SequenceArguments sequence;
-  bool depth = false;
+  bool depth = false, light = false;
 };
 
 nlohmann::json CompareDepth(const Mesh& reconstruction, const Sequence& sequence) {
@@ -26,10 +29,41 @@ nlohmann::json CompareDepth(const Mesh& reconstruction, const Sequence& sequence
   return {{"depth", ToJson(errors)}};
 }
 
+// The mesh lies in the folder of the run that made it.
+nlohmann::json CompareLight(const Arguments& arguments, const Sequence& sequence) {
+  constexpr double kPixels = 40'000;  // of a frame, about
+  const CameraIntrinsics& camera = sequence.calibration.camera;
+  const int stride =
+      std::max(1, static_cast<int>(std::lround(std::sqrt(double(camera.width) * camera.height / kPixels))));
+  // Before the run is read: what the sequence lacks is seen at once.
+  const std::vector<LightFrame> first = {TrueLight(sequence, sequence.frames.front(), stride)};
+  const LearntLight light(arguments.mesh.parent_path(), sequence);
+  std::vector<LightFrame> learnt, truth;
+  std::vector<int> numbers;
+  Progress progress("light");
+  const int count = static_cast<int>(light.frames().size());
+  for (int n = 0; n < count; ++n) {
+    const SequenceFrame& frame = sequence.frames[light.frames()[n]];
+    truth.push_back(n == 0 ? first.front() : TrueLight(sequence, frame, stride));
+    learnt.push_back(light.At(n, stride));
+    numbers.push_back(frame.number);
+    progress.Update(double(n + 1) / count);
+  }
+  const LightErrors errors = CompareLight(learnt, truth);
+  std::cout << ToTable(errors);
+  if (!arguments.folder.empty()) {
+    CreateFolder(arguments.folder);
+    WriteLightPicture(errors, learnt, truth, numbers, arguments.folder / "light.png");
+    Say("picture in " + (arguments.folder / "light.png").string());
+  }
+  return {{"light", ToJson(errors)}};
+}
+
 nlohmann::json Run(const Arguments& arguments, const CommonOptions& common) {
   const Sequence sequence = ReadSequence(arguments.sequence);
   const Mesh reconstruction = ReadMesh(arguments.mesh);
   RequireSurface(reconstruction, arguments.mesh.string());
+  if (arguments.light) return CompareLight(arguments, sequence);
   if (arguments.depth) return CompareDepth(reconstruction, sequence);
   const Mesh truth = ReadGroundTruth(sequence);
   EvaluateOptions options;
@@ -58,6 +92,12 @@ void AddEvaluate(CLI::App* app) {
   command->add_flag(
       "--depth", arguments->depth,
       "instead, hold each frame's depth against its depth file, up to scale; needs no true mesh");
+  command
+      ->add_flag(
+          "--light", arguments->light,
+          "instead, hold albedo and light between walls, as the run in the mesh's folder has learnt them, "
+          "against the channels that the sequence was rendered with")
+      ->excludes("--depth");
   command->add_option("-o,--output", arguments->folder, "folder for the coloured meshes and pictures");
 }
 
