@@ -134,9 +134,9 @@ class LearntLightOfAColon : public testing::Test {
   double direct_ratio_ = 0;  // green, learnt over true, in the median
 };
 
-// One albedo, after its factor, and what the frames show is known to be right: the direct light. The factor is off as
-// the square of the distance is, which so short a run leaves too small; of guides that are said to be twice as strong
-// as they are, half the albedo is found.
+// One albedo, after its factor, and what the frames show is known to be right: the direct light. The factor
+// is off as the square of the distance is, which so short a run leaves too small; of guides that are said to
+// be twice as strong as they are, half the albedo is found.
 TEST_F(LearntLightOfAColon, IsItsAlbedo) {
   Sequence sequence = ReadSequence(folder_ / "sequence");
   const LightErrors errors = Learn(sequence, {"schedule.iterations=200", "network.interreflection=none"});

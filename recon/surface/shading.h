@@ -40,10 +40,10 @@ struct Shading {
   Vec3<T> ambient;    // the part of the radiance that goes back to `ambient`
 };
 
-// Without the glints of a coat (recon/surface/mucus_coat.h): kLambertian and kCoat: exp(output)/π · (Σ intensity ·
-// irradiance · max(0, n·l) + ambient); kFree: exp(output) · Σ intensity · irradiance; kUnlit: 1/(1 +
-// e^−output). normal: unit, into the lumen. ambient: irradiance from the rest of the wall, where there is an
-// albedo.
+// Without the glints of a coat (recon/surface/mucus_coat.h): kLambertian and kCoat: exp(output)/π · (Σ
+// intensity · irradiance · max(0, n·l) + ambient); kFree: exp(output) · Σ intensity · irradiance; kUnlit:
+// 1/(1 + e^−output). normal: unit, into the lumen. ambient: irradiance from the rest of the wall, where there
+// is an albedo.
 template <class T>
 Shading<T> Shade(Reflectance reflectance, const Vec3<T>& output, const Vec3<T>& normal,
                  const FrameLight<T>& light, const Vec3<T>& point, const Vec3<T>& ambient);
