@@ -147,9 +147,7 @@ inline Lanes3 operator*(const Lanes3& a, const Lanes3& b) { return {a.x * b.x, a
 inline Lanes3 Select(const LanesI& mask, const Lanes3& a, const Lanes3& b) {
   return {mask ? a.x : b.x, mask ? a.y : b.y, mask ? a.z : b.z};
 }
-inline Lanes3 Max(const Lanes3& a, const Lanes3& b) {
-  return {Max(a.x, b.x), Max(a.y, b.y), Max(a.z, b.z)};
-}
+inline Lanes3 Max(const Lanes3& a, const Lanes3& b) { return {Max(a.x, b.x), Max(a.y, b.y), Max(a.z, b.z)}; }
 inline Lanes3 Cross(const Lanes3& a, const Lanes3& b) {
   return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }

@@ -45,7 +45,9 @@ const std::vector<Effect> kEffects = {
     {"noise", "sensor.noise.read_e=20", {"noise"}},
     {"peristalsis", "peristalsis.amplitude=0.3", {"peristalsis"}},
     {"shutter", "sensor.shutter.exposure=0.5", {"shutter"}},
-    {"subsurface", "surface.subsurface.scattering_per_mm=[1,1,1]", {"subsurface", "tissue_walks"}},
+    {"subsurface",
+     "surface.subsurface.scattering_per_mm=[1,1,1]",
+     {"subsurface", "tissue_path", "tissue_walks"}},
     {"vessels", "surface.vessels.spacing_mm=12", {"vessels", "vessel_growth", "wall_places"}}};
 
 // Direct light alone, in more pixels than a frame takes bytes that aren't pixels'.

@@ -192,10 +192,13 @@ class BouncePaths {
       Vec3f factor = lit.albedo[i], toward;  // cosine-distributed: BRDF · cos / density is the albedo
       if constexpr (kCoat && kTissue) {
         const LobeStep step = ByOneLobe(stop, i, random, sampler.Pair(pairs.Roulette(bounce))[1]);
+        leaving.by_glint[i] = step.by_glint ? -1 : 0;
         factor = step.factor;
         toward = step.toward;
-        leaving.by_glint[i] = step.by_glint ? -1 : 0;
-        if (factor.isZero(0)) leaving.on[i] = 0;
+        if (factor.isZero(0)) {
+          leaving.on[i] = 0;
+          continue;
+        }
       } else if constexpr (kCoat) {
         const CoatedPlace place = lit.lanes()[i];
         // The roulette's second number is free to choose the lobe.

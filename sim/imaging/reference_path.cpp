@@ -96,6 +96,7 @@ class ReferenceTracer {
         throughput *=
             Passed(*place, entry, direction) / static_cast<T>(place->glints() ? 1 - kGlintPaths : 1);
       }
+      if (throughput.isZero(0)) return light;
       if (bounce > options_.roulette_after) {
         const T survival = std::min(T(1), std::sqrt(throughput.maxCoeff()));
         if (static_cast<T>(chance[0]) >= survival) return light;

@@ -27,8 +27,9 @@
 // In a picture the coefficients give the wall's colour. The surface's albedo tells no more than how its
 // texture varies: relative to its palest place, its root dims the light on the way in and on the way out, so
 // that a texture wide against the walks looks as on a Lambertian wall, and finer ones blur. A channel whose
-// albedo is 0 stays black. Paths from wall to wall walk at every wall. What a coat mirrors doesn't walk: where
-// a path comes to tissue under a coat it goes on either from the end of a walk or, mirrored, from the place.
+// albedo is 0 stays black. Paths from wall to wall walk at every wall. What a coat mirrors doesn't walk:
+// where a path comes to tissue under a coat it goes on either from the end of a walk or, mirrored, from the
+// place.
 //
 // Three channels share a walk. Its free paths are those of a channel drawn by what each still carries, and
 // all three are weighted by the mean density of the three choices (one-sample multiple importance sampling:
