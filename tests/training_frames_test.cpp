@@ -102,9 +102,8 @@ TEST(TrainingFrames, AFrameOf4096SquaredIsNotHeldWhole) {
     return PeakOfTraining(sequence.folder, scratch / "run");
   };
   const size_t small = peak(64), large = peak(4096);
-  constexpr size_t kMask = size_t{4096} * 4096;
   EXPECT_LT(large - small, kFrameBytes + 12'000'000);
-  EXPECT_GT(large - small, kFrameBytes - kMask);  // so much it does keep
+  EXPECT_GT(large - small, kFrameBytes / 2);  // so much it does keep
 }
 
 }  // namespace
