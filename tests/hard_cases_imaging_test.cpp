@@ -34,6 +34,19 @@ TEST(HardCases, BlackWallSendsNothing) {
   }
 }
 
+// Neither of a coat's lobes has a share in nothing: of index 1 it mirrors nothing either.
+TEST(HardCases, BlackWallUnderACoatOfIndexOneSendsNothing) {
+  for (const int shared_paths : {0, 16}) {
+    Stage stage(test::Globe(20, 30), CentredPinhole(24, 18, 12), kIntensity);
+    stage.surface.albedo.setZero();
+    stage.surface.coat.emplace(CoatOptions{1, 0.3, 1, 0.06});
+    stage.options = {4, 6, 0, shared_paths};
+    Film film;
+    EXPECT_EQ(stage.Render(1, true, &film).failure.count, 0) << shared_paths;
+    for (const float value : film.radiance.data) EXPECT_EQ(value, 0);
+  }
+}
+
 // In a white sphere every bounce sends on as much as the one before: Φ/(4πR²) each. Roulette from the first
 // one on may end no path, for none has lost anything.
 TEST(HardCases, WhiteWallLosesNothing) {

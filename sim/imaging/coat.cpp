@@ -201,13 +201,14 @@ CoatLobesLanes Coat::Eval(const CoatedLanes& places, const Lanes3& incoming) con
 
 float Coat::GlintShare(const CoatedPlace& place) const {
   if (!(place.outgoing.dot(place.coat_normal) > 0)) return 0;
-  return place.reflectance / (place.reflectance + (1 - place.reflectance) * place.albedo.maxCoeff());
+  const float both = place.reflectance + (1 - place.reflectance) * place.albedo.maxCoeff();
+  return both > 0 ? place.reflectance / both : 0;  // a coat of index 1 on a black wall sends nothing
 }
 
 Lanes Coat::GlintShare(const CoatedLanes& places) const {
-  return Dot(places.outgoing, places.coat_normal) > 0.0f
-             ? places.reflectance / (places.reflectance + (1.0f - places.reflectance) * MaxOf(places.albedo))
-             : Lanes{};
+  const Lanes both = places.reflectance + (1.0f - places.reflectance) * MaxOf(places.albedo);
+  const LanesI sends = (Dot(places.outgoing, places.coat_normal) > 0.0f) & (both > 0.0f);
+  return sends ? places.reflectance / both : Lanes{};
 }
 
 float Coat::Pdf(const CoatedPlace& place, const Vec3f& incoming) const {
