@@ -102,8 +102,11 @@ TEST(TrainingFrames, AFrameOf4096SquaredIsNotHeldWhole) {
     return PeakOfTraining(sequence.folder, scratch / "run");
   };
   const size_t small = peak(64), large = peak(4096);
+  constexpr size_t kMask = size_t{4096} * 4096;
+  // Linux counts a thread's pages by 64 at a time: so far off may each of the two be, and both twice.
+  constexpr size_t kCountedAtOnce = 4 * 64 * 4096;
   EXPECT_LT(large - small, kFrameBytes + 12'000'000);
-  EXPECT_GT(large - small, kFrameBytes / 2);  // so much it does keep
+  EXPECT_GT(large - small, kFrameBytes - kMask - kCountedAtOnce);  // so much it does keep
 }
 
 }  // namespace
