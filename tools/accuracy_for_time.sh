@@ -2,7 +2,8 @@
 # What the reconstructor reaches in so many seconds of training: renders each scene once, trains on it with each seed for
 # each time, and prints the median over seeds of the surveyed and the extended mean error with their range, in mm.
 # Usage: tools/accuracy_for_time.sh DIR [SCENE]...; without scenes: the three that README's table shows.
-# SECONDS_OF_TRAINING (default "5 15 60") and SEEDS (default "0 1 2") are lists; what lies in DIR is not made again.
+# SECONDS_OF_TRAINING (default "5 15 60 300"), SEEDS (default "0 1 2") and PRESETS (default "fast") are lists; what
+# lies in DIR is not made again.
 set -euo pipefail
 source_folder=$(cd "$(dirname "$0")/.." && pwd)
 lumen=${LUMEN_BUILD:-$source_folder/build}/tools/lumen
@@ -23,17 +24,19 @@ for scene in "$@"; do
   name=$(basename "$scene" .toml)
   sequence=$folder/$name/sequence
   [ -f "$sequence/sequence.toml" ] || "$lumen" render "$scene" -o "$sequence" --quiet
-  for seconds in ${SECONDS_OF_TRAINING:-5 15 60}; do
-    surveyed=() extended=()
-    for seed in "${seeds[@]}"; do
-      run=$folder/$name/${seconds}s_$seed
-      if [ ! -f "$run/evaluation.json" ]; then
-        "$lumen" train "$sequence" -o "$run" --seconds "$seconds" --seed "$seed" --quiet > /dev/null
-        "$lumen" evaluate "$run/mesh.ply" "$sequence" --quiet --json "$run/evaluation.json" > /dev/null
-      fi
-      surveyed+=("$(mean_error "$run/evaluation.json" surveyed)")
-      extended+=("$(mean_error "$run/evaluation.json" extended)")
+  for preset in ${PRESETS:-fast}; do
+    for seconds in ${SECONDS_OF_TRAINING:-5 15 60 300}; do
+      surveyed=() extended=()
+      for seed in "${seeds[@]}"; do
+        run=$folder/$name/${preset}_${seconds}s_$seed
+        if [ ! -f "$run/evaluation.json" ]; then
+          "$lumen" train "$sequence" -o "$run" --preset "$preset" --seconds "$seconds" --seed "$seed" --quiet > /dev/null
+          "$lumen" evaluate "$run/mesh.ply" "$sequence" --quiet --json "$run/evaluation.json" > /dev/null
+        fi
+        surveyed+=("$(mean_error "$run/evaluation.json" surveyed)")
+        extended+=("$(mean_error "$run/evaluation.json" extended)")
+      done
+      echo "$name, $preset, $seconds s: surveyed $(median_and_range "${surveyed[@]}"), extended $(median_and_range "${extended[@]}")"
     done
-    echo "$name, $seconds s: surveyed $(median_and_range "${surveyed[@]}"), extended $(median_and_range "${extended[@]}")"
   done
 done

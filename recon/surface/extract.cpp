@@ -28,8 +28,8 @@ using Index3 = std::array<int, 3>;
 
 class Extractor {
  public:
-  Extractor(const Field<float>& field, const float* parameters, double cell_mm)
-      : field_(field), parameters_(parameters), cell_(cell_mm) {
+  Extractor(const Field<float>& field, const float* parameters, const ExtractOptions& options)
+      : field_(field), parameters_(parameters), continuation_(options.continuation), cell_(options.cell_mm) {
     for (int d = 0; d < 3; ++d) {
       // One cell of margin, where the field is negative for certain.
       low_[d] = field.box().min()[d] - cell_;
@@ -58,6 +58,22 @@ class Extractor {
 
  private:
   std::vector<float> Values(const std::vector<Vec3d>& points) const {
+    std::vector<float> values = FieldValues(points);
+    if (continuation_) ContinueValues(points, &values);
+    return values;
+  }
+
+  void ContinueValues(const std::vector<Vec3d>& points, std::vector<float>* values) const {
+    for (size_t i = 0; i < points.size(); ++i) {
+      // As the field itself, negative from its bounds on.
+      const double bound =
+          std::min((field_.box().max() - points[i]).minCoeff(), (points[i] - field_.box().min()).minCoeff());
+      const double value = continuation_->Blend(points[i], (*values)[i]);
+      (*values)[i] = static_cast<float>(std::min(value, bound));
+    }
+  }
+
+  std::vector<float> FieldValues(const std::vector<Vec3d>& points) const {
     const int count = static_cast<int>(points.size());
     Field<float>::ValuePass pass;
     pass.positions.Resize(3, TilesFor(count));
@@ -217,6 +233,7 @@ class Extractor {
 
   const Field<float>& field_;
   const float* parameters_;
+  const Continuation* continuation_;
   double cell_;
   double low_[3];
   int blocks_[3];
@@ -259,7 +276,7 @@ Mesh LargestComponent(const Mesh& mesh) {
 
 Mesh ExtractMesh(const Field<float>& field, const float* parameters, const Vec3d& origin,
                  const ExtractOptions& options) {
-  Mesh mesh = LargestComponent(Extractor(field, parameters, options.cell_mm).Run());
+  Mesh mesh = LargestComponent(Extractor(field, parameters, options).Run());
   for (Vec3d& vertex : mesh.vertices) vertex += origin;
   return mesh;
 }

@@ -2,12 +2,14 @@
 #pragma once
 
 #include "common/mesh.h"
+#include "recon/surface/continuation.h"
 #include "recon/surface/field.h"
 
 namespace lumen {
 
 struct ExtractOptions {
   double cell_mm = 0.75;
+  const Continuation* continuation = nullptr;  // null: the field's own surface, wherever it is
 };
 
 // Marching tetrahedra (six to a cube, so that the mesh is a closed manifold by construction) on a lattice

@@ -208,6 +208,7 @@ void ReadRest(const ConfigTable& root, TrainOptions* options) {
   }
   if (const auto extract = root.Optional("extract")) {
     options->extract_cell_mm = extract->Number("cell_mm", options->extract_cell_mm, {1e-3, 1e3});
+    options->continue_lumen = extract->Flag("continue_lumen", options->continue_lumen);
   }
 }
 
@@ -325,7 +326,8 @@ std::string FormatTrainOptions(const TrainOptions& o) {
       << "\n\n[poses]\nrefine = " << (o.poses.refine ? "true" : "false")
       << "\ntranslation_rate_mm = " << o.poses.translation_rate_mm
       << "\nrotation_rate_rad = " << o.poses.rotation_rate_rad << "\nstart = " << o.poses.start
-      << "\n\n[extract]\ncell_mm = " << o.extract_cell_mm << "\n";
+      << "\n\n[extract]\ncell_mm = " << o.extract_cell_mm
+      << "\ncontinue_lumen = " << (o.continue_lumen ? "true" : "false") << "\n";
   return out.str();
 }
 

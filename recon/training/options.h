@@ -90,6 +90,7 @@ struct TrainOptions {
   } poses;
 
   double extract_cell_mm = 0.75;
+  bool continue_lumen = true;  // the mesh, beyond what the frames see: recon/surface/continuation.h
 };
 
 // Names of the presets: "fast" (ours), "paper" (NeuS's networks and schedule with the changes of LightNeuS),

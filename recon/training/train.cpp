@@ -7,6 +7,7 @@
 #include <cmath>
 #include <ctime>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <sstream>
 
 #include "common/abandoned_files.h"
@@ -18,6 +19,7 @@
 #include "common/random.h"
 #include "recon/surface/extract.h"
 #include "recon/training/checkpoint.h"
+#include "recon/training/continue_lumen.h"
 #include "recon/training/plausible.h"
 #include "recon/training/trainer.h"
 
@@ -173,7 +175,15 @@ class Run {
   }
 
   Mesh MeshNow() {
-    return ExtractMesh(trainer_.field(), trainer_.Weights(), trainer_.origin(), {options_.extract_cell_mm});
+    ExtractOptions extract;
+    extract.cell_mm = options_.extract_cell_mm;
+    std::optional<Continuation> continuation;
+    if (options_.continue_lumen) {
+      continuation = ContinueLumen(frames_, trainer_.field(), trainer_.Weights(), trainer_.origin(),
+                                   options_.sampling, run_.seed);
+      if (continuation) extract.continuation = &*continuation;
+    }
+    return ExtractMesh(trainer_.field(), trainer_.Weights(), trainer_.origin(), extract);
   }
 
   // A resumed run keeps what it had written.

@@ -1,0 +1,41 @@
+#include "recon/training/continue_lumen.h"
+
+#include "common/random.h"
+#include "recon/training/march.h"
+
+namespace lumen {
+namespace {
+
+// A sector of a sixteenth of the wall that the frames see last has dozens of them.
+constexpr int kRays = 16384;
+
+// A ray stands for as much wall as its pixel covers, which has no bound at grazing incidence.
+constexpr double kLeastCosine = 0.1;
+
+}  // namespace
+
+std::optional<Continuation> ContinueLumen(const TrainingFrames& frames, const Field<float>& field,
+                                          const float* parameters, const Vec3d& origin,
+                                          const TrainOptions::Sampling& sampling, uint64_t seed) {
+  RayBatch<float> batch;
+  batch.rays.resize(kRays);
+  const uint64_t key = RandomBits(seed, 0x626568696e64ull);
+  for (int r = 0; r < kRays; ++r) frames.Draw(RandomBits(key, r), origin, &batch.rays[r]);
+  Field<float>::SurfacePass pass;
+  pass.positions = MeetSurface(field, parameters, sampling, key, &batch);
+  field.Surface(parameters, &pass);
+  std::vector<WallPoint> points;
+  for (int r = 0; r < kRays; ++r) {
+    const Vec3d place(pass.positions.At(0, r), pass.positions.At(1, r), pass.positions.At(2, r));
+    const Vec3d normal(pass.gradient.At(0, r), pass.gradient.At(1, r), pass.gradient.At(2, r));
+    if (pass.free.At(0, r) == 0 || !(normal.norm() > 0)) continue;  // no wall within the bounds
+    const Vec3d way = place - batch.rays[r].origin.cast<double>();
+    const double cosine = -way.normalized().dot(normal.normalized());
+    points.push_back({place, way.squaredNorm() / std::max(cosine, kLeastCosine)});
+  }
+  std::vector<Pose> cameras = frames.world_from_camera();
+  for (Pose& camera : cameras) camera.pretranslate(-origin);
+  return Continuation::Fit(points, cameras);
+}
+
+}  // namespace lumen
