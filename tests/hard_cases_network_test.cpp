@@ -8,11 +8,13 @@
 
 #include "recon/network/grid.h"
 #include "recon/network/mlp.h"
+#include "tests/bfloat16_reference.h"
 #include "tests/finite_difference.h"
 
 namespace lumen {
 namespace {
 
+using test::NearestBfloat16;
 using test::Random;
 
 constexpr double kRounding = 0x1p-24;
@@ -49,14 +51,6 @@ TEST(HardCasesTraining, GridOfAMillionPlacesIsThatOfDouble) {
   }
 }
 
-// To eight bits of significand, to nearest, ties to even; below the normal numbers in steps of 2⁻¹³³.
-double NearestBfloat16(float value) {
-  int exponent;
-  std::frexp(value, &exponent);
-  const double step = std::ldexp(1.0, std::max(exponent - 8, -133));
-  return std::nearbyint(value / step) * step;
-}
-
 // What is looked up in packed tables is to the bit what a float grid finds in the nearest bfloat16s.
 TEST(HardCasesTraining, PackedTablesHoldTheNearestBfloat16s) {
   GridOptions options;
@@ -64,7 +58,7 @@ TEST(HardCasesTraining, PackedTablesHoldTheNearestBfloat16s) {
   options.log2_table_size = 10;
   const Eigen::AlignedBox3d box(Vec3d(-8, -8, -8), Vec3d(8, 8, 8));
   const Grid<float> whole(options, box);
-  options.precision = TablePrecision::kBfloat16;
+  options.precision = Precision::kBfloat16;
   const Grid<float> half(options, box);
   EXPECT_TRUE(half.packed());
   EXPECT_FALSE(whole.packed() || Grid<double>(options, box).packed());
@@ -105,10 +99,14 @@ TEST(HardCasesTraining, PackedTablesHoldTheNearestBfloat16s) {
 // Running error analysis (Higham 2002, 3.1): a layer's sums are off by |W| times what its inputs are off by
 // and (n + 2)ε |W||x|; activations pass errors on at most whole and add 4 roundings and, softplus, the 1e-8
 // of its series and the 2⁻²⁴/β where it ends. The gradient: σ′ is off by σ″ ≤ L times the sum's error, 16
-// roundings and the same end.
-void ExpectMlpAsInDouble(Activation activation, double steepest_slope) {
+// roundings and the same end. Where factors are rounded to bfloat16, by u = 2⁻⁸ of themselves, each product
+// of |w| and |x| is off by (2u + u²)|w||x| more; the last layer's row, which the gradient starts from, isn't
+// rounded.
+void ExpectMlpAsInDouble(Activation activation, double steepest_slope,
+                         const Bfloat16Kernels* rounded = nullptr) {
   const MlpShape shape{7, {16, 16}, 3, activation, 0};
-  const Mlp<float> single(shape);
+  const double of_product = rounded ? 2 * 0x1p-8 + 0x1p-16 : 0;
+  const Mlp<float> single(shape, rounded);
   const Mlp<double> reference(shape);
   std::vector<float> weights(single.parameter_count());
   single.Initialise(3, 1, weights.data());
@@ -145,7 +143,7 @@ void ExpectMlpAsInDouble(Activation activation, double steepest_slope) {
         for (int i = 0; i < m.columns; ++i) {
           const double weight = std::abs(wide[m.begin + size_t(o) * m.columns + i]);
           sum += weight * size_of[i];
-          carried += weight * error[i];
+          carried += weight * (error[i] + of_product * (size_of[i] + error[i]));
         }
         next_error[o] = carried + kRounding * (m.columns + 2) * (sum + carried);
         slope_error[l][o] = steepest_slope * next_error[o] + 20 * kRounding;
@@ -172,7 +170,8 @@ void ExpectMlpAsInDouble(Activation activation, double steepest_slope) {
           const double adjoint_off =
               off[o] + std::min(slope_error[l][o], 1.0) * (pulled[o] + off[o]) + kRounding * pulled[o];
           below[i] += weight * pulled[o];
-          below_off[i] += weight * (adjoint_off + kRounding * (m.rows + 1) * (pulled[o] + adjoint_off));
+          below_off[i] +=
+              weight * (adjoint_off + (of_product + kRounding * (m.rows + 1)) * (pulled[o] + adjoint_off));
         }
       }
       pulled = below;
@@ -190,6 +189,12 @@ TEST(HardCasesTraining, SquareplusNetworkOfAMillionPlacesIsThatOfDouble) {
 }
 TEST(HardCasesTraining, SoftplusNetworkOfAMillionPlacesIsThatOfDouble) {
   ExpectMlpAsInDouble(Activation::kSoftplus, 25);  // σ″ ≤ β/4
+}
+TEST(HardCasesTraining, NetworkInBfloat16OfAMillionPlacesIsThatOfDouble) {
+  ExpectMlpAsInDouble(Activation::kSquareplus, 5, &FastestBfloat16Kernels());
+}
+TEST(HardCasesTraining, NetworkInPortableBfloat16IsThatOfDouble) {
+  ExpectMlpAsInDouble(Activation::kSquareplus, 5, &PortableBfloat16Kernels());
 }
 
 }  // namespace

@@ -2,17 +2,14 @@
 // presets give it: products a second beside Eigen's bare one at the same shape, bytes a second beside a copy.
 // flop/s counts the multiplications and additions of the products alone, bytes/s what must be read and
 // written.
+#include "tools/bench_train.h"
+
 #include <benchmark/benchmark.h>
-#ifdef LUMEN_HAS_XSMM
-#include <libxsmm.h>
-#endif
 
 #include <cstring>
 
 #include "common/math.h"
-#include "common/random.h"
 #include "recon/network/adam.h"
-#include "recon/network/product.h"
 #include "recon/surface/field.h"
 #include "recon/surface/shading.h"
 #include "recon/surface/volume.h"
@@ -20,146 +17,6 @@
 
 namespace lumen {
 namespace {
-
-using benchmark::Counter;
-using benchmark::State;
-
-// Samples of a batch: 32 rays of the fast preset's 17 samples.
-constexpr int kTiles = 9;
-constexpr int kSamples = kTiles * kTile;
-
-void CountFlops(State& state, double flops) {
-  state.counters["flop/s"] = Counter(flops, Counter::kIsIterationInvariantRate);
-}
-void CountBytes(State& state, double bytes) {
-  state.counters["bytes/s"] = Counter(bytes, Counter::kIsIterationInvariantRate);
-}
-void CountSamples(State& state, double samples) {
-  state.counters["samples/s"] = Counter(samples, Counter::kIsIterationInvariantRate);
-}
-
-template <class Container>
-void FillRandom(Container* values, double size) {
-  for (size_t i = 0; i < values->size(); ++i)
-    (*values)[i] = static_cast<float>(size * (2 * UniformDouble(RandomBits(7, i)) - 1));
-}
-
-Panel<float> RandomPanel(int rows, int tiles, double size = 1) {
-  Panel<float> panel(rows, tiles);
-  for (int i = 0; i < rows * tiles * kTile; ++i)
-    panel.Tile(0)[i] = static_cast<float>(size * (2 * UniformDouble(RandomBits(9, i)) - 1));
-  return panel;
-}
-
-// Arguments: outputs, inputs.
-double ProductFlops(const State& state) { return 2.0 * double(state.range(0) * state.range(1)) * kSamples; }
-
-void ProductForward(State& state) {
-  const int outputs = static_cast<int>(state.range(0)), inputs = static_cast<int>(state.range(1));
-  LineVector<float> weight(size_t(outputs) * inputs), bias(outputs, 0.1f);
-  FillRandom(&weight, 1);
-  const Panel<float> x = RandomPanel(inputs, kTiles);
-  Panel<float> y(outputs, kTiles);
-  for (auto _ : state) {
-    for (int t = 0; t < kTiles; ++t)
-      Multiply(weight.data(), bias.data(), outputs, inputs, x.Tile(t), y.Tile(t));
-    benchmark::DoNotOptimize(y.Tile(0));
-    benchmark::ClobberMemory();
-  }
-  CountFlops(state, ProductFlops(state));
-}
-
-void ProductBackward(State& state) {
-  const int outputs = static_cast<int>(state.range(0)), inputs = static_cast<int>(state.range(1));
-  LineVector<float> weight(size_t(outputs) * inputs);
-  FillRandom(&weight, 1);
-  const Panel<float> y = RandomPanel(outputs, kTiles);
-  Panel<float> x(inputs, kTiles);
-  for (auto _ : state) {
-    for (int t = 0; t < kTiles; ++t) MultiplyTransposed(weight.data(), outputs, inputs, y.Tile(t), x.Tile(t));
-    benchmark::DoNotOptimize(x.Tile(0));
-    benchmark::ClobberMemory();
-  }
-  CountFlops(state, ProductFlops(state));
-}
-
-void ProductOuter(State& state) {
-  const int outputs = static_cast<int>(state.range(0)), inputs = static_cast<int>(state.range(1));
-  const Panel<float> y = RandomPanel(outputs, kTiles), x = RandomPanel(inputs, kTiles);
-  LineVector<float> gradient(size_t(outputs) * inputs), bias(outputs);
-  for (auto _ : state) {
-    AccumulateOuter(y, x, gradient.data(), bias.data());
-    benchmark::DoNotOptimize(gradient.data());
-    benchmark::ClobberMemory();
-  }
-  CountFlops(state, ProductFlops(state));
-}
-
-#ifdef LUMEN_HAS_XSMM
-// libxsmm's kernel of a tile's product, in its column-major terms: y (kTile × outputs) = x (kTile × inputs)
-// by weight, which is stored as its transpose for one direction and as it is for the other.
-void XsmmProduct(State& state, int from, int to, bool transposed) {
-  const int rows = kTile, stored = transposed ? to : from;
-  const int flags = transposed ? LIBXSMM_GEMM_FLAG_TRANS_B : LIBXSMM_GEMM_FLAG_NONE;
-  const float alpha = 1, beta = 0;
-  const libxsmm_smmfunction kernel =
-      libxsmm_smmdispatch(rows, to, from, &rows, &stored, &rows, &alpha, &beta, &flags, nullptr);
-  if (!kernel) return state.SkipWithError("libxsmm has no kernel of this shape");
-  LineVector<float> weight(size_t(from) * to);
-  FillRandom(&weight, 1);
-  const Panel<float> x = RandomPanel(from, kTiles);
-  Panel<float> y(to, kTiles);
-  for (auto _ : state) {
-    for (int t = 0; t < kTiles; ++t) kernel(x.Tile(t), weight.data(), y.Tile(t));
-    benchmark::DoNotOptimize(y.Tile(0));
-    benchmark::ClobberMemory();
-  }
-  CountFlops(state, ProductFlops(state));
-}
-void XsmmForward(State& state) { XsmmProduct(state, int(state.range(1)), int(state.range(0)), false); }
-void XsmmBackward(State& state) { XsmmProduct(state, int(state.range(0)), int(state.range(1)), true); }
-#endif
-
-using Rows = Eigen::Matrix<float, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
-
-void EigenForward(State& state) {
-  const Rows weight = Rows::Random(state.range(0), state.range(1));
-  const Rows x = Rows::Random(state.range(1), kSamples);
-  Rows y(state.range(0), kSamples);
-  for (auto _ : state) {
-    y.noalias() = weight * x;
-    benchmark::DoNotOptimize(y.data());
-    benchmark::ClobberMemory();
-  }
-  CountFlops(state, ProductFlops(state));
-}
-
-void EigenOuter(State& state) {
-  const Rows y = Rows::Random(state.range(0), kSamples), x = Rows::Random(state.range(1), kSamples);
-  Rows gradient = Rows::Zero(state.range(0), state.range(1));
-  for (auto _ : state) {
-    gradient.noalias() += y * x.transpose();
-    benchmark::DoNotOptimize(gradient.data());
-    benchmark::ClobberMemory();
-  }
-  CountFlops(state, ProductFlops(state));
-}
-
-// The layers of the fast preset's networks, of wider ones, and of the paper's.
-void Shapes(benchmark::internal::Benchmark* benchmark) {
-  for (const auto& [outputs, inputs] :
-       {std::pair(32, 19), {16, 32}, {32, 18}, {32, 32}, {64, 64}, {256, 256}})
-    benchmark->Args({outputs, inputs});
-}
-BENCHMARK(ProductForward)->Apply(Shapes);
-BENCHMARK(EigenForward)->Apply(Shapes);
-BENCHMARK(ProductBackward)->Apply(Shapes);
-BENCHMARK(ProductOuter)->Apply(Shapes);
-#ifdef LUMEN_HAS_XSMM
-BENCHMARK(XsmmForward)->Apply(Shapes);
-BENCHMARK(XsmmBackward)->Apply(Shapes);
-#endif
-BENCHMARK(EigenOuter)->Apply(Shapes);
 
 void StreamCopy(State& state) {
   const auto count = static_cast<size_t>(state.range(0));
@@ -292,11 +149,12 @@ void FrequencyBackward(State& state) {
 }
 BENCHMARK(FrequencyBackward);
 
-// The distance network of a preset; argument: 0 = fast's, 1 = the paper's.
+// The distance network of a preset; arguments: 0 = fast's, 1 = the paper's; 1 = with products in bfloat16.
 struct Network {
   explicit Network(const State& state)
       : mlp(state.range(0) == 0 ? MlpShape{19, {32}, 16, Activation::kSquareplus}
-                                : MlpShape{39, std::vector<int>(8, 256), 257, Activation::kSoftplus, 4}),
+                                : MlpShape{39, std::vector<int>(8, 256), 257, Activation::kSoftplus, 4},
+            state.range(1) == 0 ? nullptr : &FastestBfloat16Kernels()),
         parameters(mlp.parameter_count()),
         gradient(mlp.parameter_count(), 0.0f),
         input(RandomPanel(mlp.shape().inputs, kTiles)),
@@ -323,7 +181,7 @@ void NetworkForward(State& state) {
   }
   CountFlops(state, network.flops);
 }
-BENCHMARK(NetworkForward)->Arg(0)->Arg(1);
+BENCHMARK(NetworkForward)->ArgsProduct({{0, 1}, {0, 1}});
 
 void NetworkInputGradient(State& state) {
   Network network(state);
@@ -336,7 +194,7 @@ void NetworkInputGradient(State& state) {
   const auto last = network.mlp.matrices().back();
   CountFlops(state, network.flops - 2.0 * last.rows * last.columns * kSamples);
 }
-BENCHMARK(NetworkInputGradient)->Arg(0)->Arg(1);
+BENCHMARK(NetworkInputGradient)->ArgsProduct({{0, 1}, {0, 1}});
 
 void NetworkBackward(State& state) {
   Network network(state);
@@ -348,7 +206,7 @@ void NetworkBackward(State& state) {
   }
   CountFlops(state, 2 * network.flops);
 }
-BENCHMARK(NetworkBackward)->Arg(0)->Arg(1);
+BENCHMARK(NetworkBackward)->ArgsProduct({{0, 1}, {0, 1}});
 
 void NetworkBackwardSecondOrder(State& state) {
   Network network(state);
@@ -364,7 +222,7 @@ void NetworkBackwardSecondOrder(State& state) {
   const auto last = network.mlp.matrices().back();
   CountFlops(state, 4 * network.flops - 4.0 * last.rows * last.columns * kSamples);
 }
-BENCHMARK(NetworkBackwardSecondOrder)->Arg(0)->Arg(1);
+BENCHMARK(NetworkBackwardSecondOrder)->ArgsProduct({{0, 1}, {0, 1}});
 
 const char* const kPresets[] = {"fast", "paper"};
 

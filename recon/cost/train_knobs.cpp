@@ -97,9 +97,11 @@ std::vector<TrainKnob> TrainKnobsOf(const TrainOptions& own, int available_frame
     knobs.push_back(
         NumberKnob("grid_levels", own, pick({4}, {2, 4, 6, 10, 12}), grid.levels,
                    [](double n, TrainOptions* o) { o->field.grid.levels = static_cast<int>(n); }));
-    knobs.push_back(ChoiceKnob<TablePrecision>("precision", own, {"float", "bf16"},
-                                               [](TrainOptions* o) { return &o->field.grid.precision; }));
+    knobs.push_back(ChoiceKnob<Precision>("precision", own, {"float", "bf16"},
+                                          [](TrainOptions* o) { return &o->field.grid.precision; }));
   }
+  knobs.push_back(ChoiceKnob<Precision>("network_precision", own, {"float", "bf16"},
+                                        [](TrainOptions* o) { return &o->field.network_precision; }));
   knobs.push_back(WidthKnob(own, pick({0.5, 2}, {0.25, 0.5, 2, 4})));
   std::vector<double> frames;
   for (double n : pick({5}, {3, 5, 10, 20, 40}))

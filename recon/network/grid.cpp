@@ -10,17 +10,6 @@
 
 namespace lumen {
 
-namespace {
-
-// NaN stays NaN, though its upper half alone might not be one.
-uint32_t Bfloat16Of(float value) {
-  const auto bits = std::bit_cast<uint32_t>(value);
-  const uint32_t rounded = (bits + 0x7fff + ((bits >> 16) & 1)) >> 16;
-  return value == value ? rounded : (bits >> 16) | 0x40;
-}
-
-}  // namespace
-
 template <class T>
 struct Grid<T>::Cell {
   alignas(64) int32_t entry[8][kTile];  // corner c: bit d of c set = the upper corner along axis d
@@ -35,7 +24,7 @@ struct Grid<T>::Corners {
 
 template <class T>
 Grid<T>::Grid(const GridOptions& options, const Eigen::AlignedBox3d& box)
-    : packed_(options.precision == TablePrecision::kBfloat16 && std::is_same_v<T, float>) {
+    : packed_(options.precision == Precision::kBfloat16 && std::is_same_v<T, float>) {
   for (int d = 0; d < 3; ++d) low_[d] = static_cast<T>(box.min()[d]);
   const double ratio = options.levels > 1 ? std::pow(options.finest_cell_mm / options.coarsest_cell_mm,
                                                      1.0 / (options.levels - 1))

@@ -7,20 +7,19 @@
 #include <vector>
 
 #include "common/math.h"
+#include "recon/network/bfloat16.h"
 #include "recon/network/panel.h"
 
 namespace lumen {
-
-// What the encoding reads the tables as. bfloat16 is a float's upper half, eight bits of significand: half
-// the memory to look up in. What is learnt stays float, for Adam's steps are smaller than a bfloat16's.
-enum class TablePrecision { kFloat, kBfloat16 };
 
 struct GridOptions {
   int levels = 8;
   double coarsest_cell_mm = 8.5;
   double finest_cell_mm = 0.53;
   int log2_table_size = 15;  // entries a level at most
-  TablePrecision precision = TablePrecision::kFloat;
+  // What the encoding reads the tables as; bfloat16 is half the memory to look up in. What is learnt stays
+  // float, for Adam's steps are smaller than a bfloat16's.
+  Precision precision = Precision::kFloat;
 };
 
 template <class T>

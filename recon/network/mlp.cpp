@@ -1,10 +1,10 @@
 #include "recon/network/mlp.h"
 
 #include <cmath>
+#include <type_traits>
 
 #include "common/math.h"
 #include "common/random.h"
-#include "recon/network/product.h"
 
 namespace lumen {
 namespace {
@@ -32,12 +32,12 @@ void AddScaledRows(int rows, T scale, const T* from, T* to) {
 }  // namespace
 
 template <class T>
-Mlp<T>::Mlp(const MlpShape& shape) : shape_(shape) {
+Mlp<T>::Mlp(const MlpShape& shape, const Bfloat16Kernels* rounded) : shape_(shape), rounded_(rounded) {
   std::vector<int> widths = {shape.inputs};
   widths.insert(widths.end(), shape.hidden.begin(), shape.hidden.end());
   widths.push_back(shape.outputs);
   for (size_t l = 0; l + 1 < widths.size(); ++l) {
-    Layer layer{widths[l], widths[l + 1], parameter_count_, 0};
+    MlpLayer layer{widths[l], widths[l + 1], parameter_count_, 0};
     if (shape.skip > 0 && static_cast<int>(l) + 1 == shape.skip) layer.outputs -= shape.inputs;
     layer.bias = layer.weight + size_t(layer.inputs) * layer.outputs;
     parameter_count_ = layer.bias + layer.outputs;
@@ -48,7 +48,7 @@ Mlp<T>::Mlp(const MlpShape& shape) : shape_(shape) {
 template <class T>
 void Mlp<T>::Initialise(uint64_t seed, double last_layer_scale, T* parameters) const {
   for (int l = 0; l < layer_count(); ++l) {
-    const Layer& layer = layers_[l];
+    const MlpLayer& layer = layers_[l];
     const double bound = std::sqrt(6.0 / layer.inputs) * (l + 1 == layer_count() ? last_layer_scale : 1.0);
     for (size_t i = layer.weight; i < layer.bias; ++i) {
       parameters[i] = static_cast<T>(bound * (2 * UniformDouble(RandomBits(seed, i)) - 1));
@@ -60,7 +60,7 @@ void Mlp<T>::Initialise(uint64_t seed, double last_layer_scale, T* parameters) c
 template <class T>
 void Mlp<T>::InitialiseSmooth(uint64_t seed, double last_layer_scale, int place_begin, T* parameters) const {
   for (int l = 0; l < layer_count(); ++l) {
-    const Layer& layer = layers_[l];
+    const MlpLayer& layer = layers_[l];
     std::fill(parameters + layer.bias, parameters + layer.bias + layer.outputs, T(0));
     const double scale = std::sqrt(2.0 / layer.outputs) * (l + 1 == layer_count() ? last_layer_scale : 1.0);
     for (int o = 0; o < layer.outputs; ++o) {
@@ -78,7 +78,7 @@ void Mlp<T>::InitialiseSmooth(uint64_t seed, double last_layer_scale, int place_
 template <class T>
 void Mlp<T>::InitialiseAsSphere(uint64_t seed, double radius, int place_begin, T* parameters) const {
   InitialiseSmooth(seed, 1, place_begin, parameters);
-  const Layer& last = layers_.back();
+  const MlpLayer& last = layers_.back();
   for (size_t at = last.weight; at < last.bias; ++at)
     parameters[at] = static_cast<T>(-std::sqrt(kPi / last.inputs) + 1e-4 * Gauss(seed, at));
   std::fill(parameters + last.bias, parameters + last.bias + last.outputs, static_cast<T>(radius));
@@ -87,12 +87,23 @@ void Mlp<T>::InitialiseAsSphere(uint64_t seed, double radius, int place_begin, T
 template <class T>
 std::vector<typename Mlp<T>::Matrix> Mlp<T>::matrices() const {
   std::vector<Matrix> all;
-  for (const Layer& layer : layers_) all.push_back({layer.weight, layer.outputs, layer.inputs});
+  for (const MlpLayer& layer : layers_) all.push_back({layer.weight, layer.outputs, layer.inputs});
   return all;
 }
 
 template <class T>
-void Mlp<T>::Forward(const T* parameters, const Panel<T>& input, int outputs, Keep keep, Pass* pass) const {
+template <class PassBy>
+void Mlp<T>::WithProducts(const T* parameters, Pass* pass, const PassBy& pass_by) const {
+  if constexpr (std::is_same_v<T, float>) {
+    if (rounded_) return pass_by(Bfloat16Products(*rounded_, parameters, &pass->rounded));
+  }
+  pass_by(ExactProducts<T>(parameters));
+}
+
+template <class T>
+template <class Products>
+void Mlp<T>::ForwardBy(Products products, const T* parameters, const Panel<T>& input, int outputs, Keep keep,
+                       Pass* pass) const {
   const int tiles = input.tiles();
   const bool with_slopes = keep != Keep::kNothing;
   const bool with_bends = keep == Keep::kBends;
@@ -106,14 +117,14 @@ void Mlp<T>::Forward(const T* parameters, const Panel<T>& input, int outputs, Ke
     if (with_slopes) pass->slope[l].Resize(layers_[l].outputs, tiles);
     if (with_bends) pass->bend[l].Resize(layers_[l].outputs, tiles);
   }
+  products.PrepareMultiply(layers_, outputs);
   for (int tile = 0; tile < tiles; ++tile) {
     const T* x = input.Tile(tile);
     for (int l = 0; l < layer_count(); ++l) {
-      const Layer& layer = layers_[l];
+      const MlpLayer& layer = layers_[l];
       T* y = pass->value[l].Tile(tile);
       const bool last = l + 1 == layer_count();
-      Multiply(parameters + layer.weight, parameters + layer.bias, last ? outputs : layer.outputs,
-               layer.inputs, x, y);
+      products.Multiply(layer, parameters + layer.bias, last ? outputs : layer.outputs, x, y);
       if (!last) {
         T* slope = with_slopes ? pass->slope[l].Tile(tile) : nullptr;
         T* bend = with_bends ? pass->bend[l].Tile(tile) : nullptr;
@@ -130,7 +141,8 @@ void Mlp<T>::Forward(const T* parameters, const Panel<T>& input, int outputs, Ke
 }
 
 template <class T>
-void Mlp<T>::InputGradient(const T* parameters, Pass* pass) const {
+template <class Products>
+void Mlp<T>::InputGradientBy(Products products, const T* parameters, Pass* pass) const {
   const int tiles = pass->value[0].tiles();
   const int last = layer_count() - 1;
   pass->pulled.resize(last);
@@ -140,16 +152,16 @@ void Mlp<T>::InputGradient(const T* parameters, Pass* pass) const {
     pass->adjoint[l].Resize(layers_[l].outputs, tiles);
   }
   pass->input_gradient.Resize(shape_.inputs, tiles);
+  products.PrepareTransposed(layers_, 0);
   for (int tile = 0; tile < tiles; ++tile) {
     for (int l = last; l >= 0; --l) {
-      const Layer& layer = layers_[l];
+      const MlpLayer& layer = layers_[l];
       T* pulled = l > 0 ? pass->pulled[l - 1].Tile(tile) : pass->input_gradient.Tile(tile);
       if (l == last) {  // b_L = e₀: the transposed product is the first row of W_L
         for (int i = 0; i < layer.inputs; ++i)
           std::fill(pulled + i * kTile, pulled + (i + 1) * kTile, parameters[layer.weight + i]);
       } else {
-        MultiplyTransposed(parameters + layer.weight, layer.outputs, layer.inputs,
-                           pass->adjoint[l].Tile(tile), pulled);
+        products.MultiplyTransposed(layer, layer.outputs, pass->adjoint[l].Tile(tile), pulled);
       }
       if (l == 0) break;
       const T* slope = pass->slope[l - 1].Tile(tile);
@@ -166,7 +178,8 @@ void Mlp<T>::InputGradient(const T* parameters, Pass* pass) const {
 }
 
 template <class T>
-void Mlp<T>::PushTangent(const T* parameters, const Panel<T>& direction, Pass* pass) const {
+template <class Products>
+void Mlp<T>::PushTangentBy(Products products, const Panel<T>& direction, Pass* pass) const {
   const int hidden = layer_count() - 1;
   pass->pushed.resize(hidden);
   pass->tangent.resize(hidden);
@@ -174,13 +187,14 @@ void Mlp<T>::PushTangent(const T* parameters, const Panel<T>& direction, Pass* p
     pass->pushed[l].Resize(layers_[l].outputs, direction.tiles());
     pass->tangent[l].Resize(layers_[l + 1].inputs, direction.tiles());
   }
+  products.PrepareMultiply(layers_, 0);
   for (int tile = 0; tile < direction.tiles(); ++tile) {
     const T* x = direction.Tile(tile);
     for (int l = 0; l < hidden; ++l) {
-      const Layer& layer = layers_[l];
+      const MlpLayer& layer = layers_[l];
       T* pushed = pass->pushed[l].Tile(tile);
       T* tangent = pass->tangent[l].Tile(tile);
-      Multiply<T>(parameters + layer.weight, nullptr, layer.outputs, layer.inputs, x, pushed);
+      products.Multiply(layer, nullptr, layer.outputs, x, pushed);
       const T* slope = pass->slope[l].Tile(tile);
       for (int i = 0; i < layer.outputs * kTile; ++i) tangent[i] = slope[i] * pushed[i];
       if (JoinsInput(l + 1))
@@ -191,23 +205,25 @@ void Mlp<T>::PushTangent(const T* parameters, const Panel<T>& direction, Pass* p
 }
 
 template <class T>
-void Mlp<T>::BackwardImpl(const T* parameters, const Panel<T>& input, const Panel<T>& output_delta,
-                          const Panel<T>* direction, Pass* pass, T* gradient, Panel<T>* input_delta) const {
+template <class Products>
+void Mlp<T>::BackwardBy(Products products, const Panel<T>& input, const Panel<T>& output_delta,
+                        const Panel<T>* direction, Pass* pass, T* gradient, Panel<T>* input_delta) const {
   const int tiles = input.tiles();
   const int last = layer_count() - 1;
   pass->delta.resize(last);
   for (int l = 0; l < last; ++l) pass->delta[l].Resize(layers_[l].outputs, tiles);
   if (input_delta) input_delta->Resize(shape_.inputs, tiles);
   if (shape_.skip > 0) pass->joined_delta.Resize(layers_[shape_.skip].inputs, 1);
+  products.PrepareTransposed(layers_, output_delta.rows());
   for (int tile = 0; tile < tiles; ++tile) {
     for (int l = last; l >= 0; --l) {
-      const Layer& layer = layers_[l];
+      const MlpLayer& layer = layers_[l];
       if (l == 0 && !input_delta) break;
       const T* delta = l == last ? output_delta.Tile(tile) : pass->delta[l].Tile(tile);
       T* below = l > 0 ? pass->delta[l - 1].Tile(tile) : input_delta->Tile(tile);
       const int outputs = l == last ? output_delta.rows() : layer.outputs;
       T* joined = JoinsInput(l) ? pass->joined_delta.Tile(0) : below;
-      MultiplyTransposed(parameters + layer.weight, outputs, layer.inputs, delta, joined);
+      products.MultiplyTransposed(layer, outputs, delta, joined);
       if (l == 0) break;
       const T* slope = pass->slope[l - 1].Tile(tile);
       const int count = layers_[l - 1].outputs * kTile;
@@ -229,30 +245,53 @@ void Mlp<T>::BackwardImpl(const T* parameters, const Panel<T>& input, const Pane
   for (int l = 0; l <= last; ++l) {
     const Panel<T>& delta = l == last ? output_delta : pass->delta[l];
     const Panel<T>& below = l > 0 ? pass->value[l - 1] : input;
-    AccumulateOuter(delta, below, gradient + layers_[l].weight, gradient + layers_[l].bias);
+    products.AccumulateOuter(delta, below, gradient + layers_[l].weight, gradient + layers_[l].bias);
   }
+}
+
+template <class T>
+template <class Products>
+void Mlp<T>::BackwardSecondOrderBy(Products products, const Panel<T>& input, const Panel<T>& output_delta,
+                                   const Panel<T>& direction, Pass* pass, T* gradient,
+                                   Panel<T>* input_delta) const {
+  PushTangentBy(products, direction, pass);
+  BackwardBy(products, input, output_delta, &direction, pass, gradient, input_delta);
+  const int last = layer_count() - 1;
+  for (int l = 0; l < last; ++l) {
+    const Panel<T>& below = l > 0 ? pass->tangent[l - 1] : direction;
+    products.AccumulateOuter(pass->adjoint[l], below, gradient + layers_[l].weight, nullptr);
+  }
+  // b_L = e₀: only the first row of W_L gains, Σ_samples φ_(L−1).
+  const Panel<T>& below = last > 0 ? pass->tangent[last - 1] : direction;
+  AccumulateRows(below, gradient + layers_[last].weight);
+}
+
+template <class T>
+void Mlp<T>::Forward(const T* parameters, const Panel<T>& input, int outputs, Keep keep, Pass* pass) const {
+  WithProducts(parameters, pass,
+               [&](auto products) { ForwardBy(products, parameters, input, outputs, keep, pass); });
+}
+
+template <class T>
+void Mlp<T>::InputGradient(const T* parameters, Pass* pass) const {
+  WithProducts(parameters, pass, [&](auto products) { InputGradientBy(products, parameters, pass); });
 }
 
 template <class T>
 void Mlp<T>::Backward(const T* parameters, const Panel<T>& input, const Panel<T>& output_delta, Pass* pass,
                       T* gradient, Panel<T>* input_delta) const {
-  BackwardImpl(parameters, input, output_delta, nullptr, pass, gradient, input_delta);
+  WithProducts(parameters, pass, [&](auto products) {
+    BackwardBy(products, input, output_delta, nullptr, pass, gradient, input_delta);
+  });
 }
 
 template <class T>
 void Mlp<T>::BackwardSecondOrder(const T* parameters, const Panel<T>& input, const Panel<T>& output_delta,
                                  const Panel<T>& direction, Pass* pass, T* gradient,
                                  Panel<T>* input_delta) const {
-  PushTangent(parameters, direction, pass);
-  BackwardImpl(parameters, input, output_delta, &direction, pass, gradient, input_delta);
-  const int last = layer_count() - 1;
-  for (int l = 0; l < last; ++l) {
-    const Panel<T>& below = l > 0 ? pass->tangent[l - 1] : direction;
-    AccumulateOuter<T>(pass->adjoint[l], below, gradient + layers_[l].weight, nullptr);
-  }
-  // b_L = e₀: only the first row of W_L gains, Σ_samples φ_(L−1).
-  const Panel<T>& below = last > 0 ? pass->tangent[last - 1] : direction;
-  AccumulateRows(below, gradient + layers_[last].weight);
+  WithProducts(parameters, pass, [&](auto products) {
+    BackwardSecondOrderBy(products, input, output_delta, direction, pass, gradient, input_delta);
+  });
 }
 
 template class Mlp<float>;

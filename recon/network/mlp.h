@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "recon/network/activation.h"
+#include "recon/network/mlp_products.h"
 #include "recon/network/panel.h"
 
 namespace lumen {
@@ -31,7 +32,9 @@ struct MlpShape {
 template <class T>
 class Mlp {
  public:
-  explicit Mlp(const MlpShape& shape);
+  // rounded: what the passes round the factors of their products to bfloat16 by; null: they don't. A network
+  // of doubles, which is for reference, never does.
+  explicit Mlp(const MlpShape& shape, const Bfloat16Kernels* rounded = nullptr);
 
   const MlpShape& shape() const { return shape_; }
   size_t parameter_count() const { return parameter_count_; }
@@ -64,6 +67,7 @@ class Mlp {
     std::vector<Panel<T>> delta;    // ∂loss/∂a_l
     Panel<T> input_gradient;        // q
     Panel<T> joined_delta;          // ∂loss/∂(h, x)/√2 of one tile, where the shape has a skip
+    Bfloat16Products::Room rounded;
   };
 
   // What a forward pass keeps for the passes that may follow.
@@ -87,18 +91,28 @@ class Mlp {
                            const Panel<T>& direction, Pass* pass, T* gradient, Panel<T>* input_delta) const;
 
  private:
-  struct Layer {
-    int inputs, outputs;
-    size_t weight, bias;  // offsets in the parameters
-  };
   int layer_count() const { return static_cast<int>(layers_.size()); }
   bool JoinsInput(int layer) const { return layer > 0 && layer == shape_.skip; }
-  void PushTangent(const T* parameters, const Panel<T>& direction, Pass* pass) const;
-  void BackwardImpl(const T* parameters, const Panel<T>& input, const Panel<T>& output_delta,
-                    const Panel<T>* direction, Pass* pass, T* gradient, Panel<T>* input_delta) const;
+  // pass_by(products), which are ExactProducts<T> or Bfloat16Products.
+  template <class PassBy>
+  void WithProducts(const T* parameters, Pass* pass, const PassBy& pass_by) const;
+  template <class Products>
+  void ForwardBy(Products products, const T* parameters, const Panel<T>& input, int outputs, Keep keep,
+                 Pass* pass) const;
+  template <class Products>
+  void InputGradientBy(Products products, const T* parameters, Pass* pass) const;
+  template <class Products>
+  void PushTangentBy(Products products, const Panel<T>& direction, Pass* pass) const;
+  template <class Products>
+  void BackwardBy(Products products, const Panel<T>& input, const Panel<T>& output_delta,
+                  const Panel<T>* direction, Pass* pass, T* gradient, Panel<T>* input_delta) const;
+  template <class Products>
+  void BackwardSecondOrderBy(Products products, const Panel<T>& input, const Panel<T>& output_delta,
+                             const Panel<T>& direction, Pass* pass, T* gradient, Panel<T>* input_delta) const;
 
   MlpShape shape_;
-  std::vector<Layer> layers_;
+  const Bfloat16Kernels* rounded_;
+  std::vector<MlpLayer> layers_;
   size_t parameter_count_ = 0;
 };
 

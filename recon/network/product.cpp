@@ -2,6 +2,8 @@
 
 #include <cstring>
 
+#include "recon/network/row_blocks.h"
+
 namespace lumen {
 namespace {
 
@@ -64,26 +66,13 @@ void MultiplyRows(const T* weight, size_t row_stride, size_t column_stride, cons
 // As many rows as leave registers for a column of the input, which comes in once for all of them.
 constexpr int kMostRows = 6;
 
-template <class T, int kRows = kMostRows>
-void MultiplySomeRows(int rows, const T* weight, size_t row_stride, size_t column_stride, const T* bias,
-                      int columns, const T* x, T* y) {
-  if (rows == kRows) return MultiplyRows<T, kRows>(weight, row_stride, column_stride, bias, columns, x, y);
-  if constexpr (kRows > 1) {
-    MultiplySomeRows<T, kRows - 1>(rows, weight, row_stride, column_stride, bias, columns, x, y);
-  }
-}
-
-// In blocks of equal heights, or one row less.
 template <class T>
 void MultiplyStrided(const T* weight, size_t row_stride, size_t column_stride, const T* bias, int rows,
                      int columns, const T* x, T* y) {
-  const int blocks = (rows + kMostRows - 1) / kMostRows;
-  for (int block = 0, r = 0; block < blocks; ++block) {
-    const int end = rows * (block + 1) / blocks;
-    MultiplySomeRows<T>(end - r, weight + r * row_stride, row_stride, column_stride,
-                        bias ? bias + r : nullptr, columns, x, y + r * kTile);
-    r = end;
-  }
+  ForRowBlocks<kMostRows>(rows, [&](auto count, int r) {
+    MultiplyRows<T, count>(weight + r * row_stride, row_stride, column_stride, bias ? bias + r : nullptr,
+                           columns, x, y + r * kTile);
+  });
 }
 
 // Tiles of both panels that go through the second-level cache together.

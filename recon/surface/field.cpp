@@ -23,6 +23,10 @@ MlpShape AmbientShape(const FieldOptions& options) {
   return {3, options.ambient_hidden, 3, Activation::kSquareplus};
 }
 
+const Bfloat16Kernels* RoundingOf(const FieldOptions& options) {
+  return options.network_precision == Precision::kBfloat16 ? &FastestBfloat16Kernels() : nullptr;
+}
+
 // The distance network starts close to nothing, so that training starts from the initial surface; colours
 // start near the middle of their range.
 constexpr double kSdfStart = 0.02;
@@ -45,9 +49,9 @@ Field<T>::Field(const FieldOptions& options, const InitialSurface& initial, cons
       grid_(options.grid, box),
       place_frequency_(options.place_octaves),
       direction_frequency_(options.direction_octaves),
-      sdf_(SdfShape(options)),
-      color_(ColorShape(options)),
-      ambient_(AmbientShape(options)),
+      sdf_(SdfShape(options), RoundingOf(options)),
+      color_(ColorShape(options), RoundingOf(options)),
+      ambient_(AmbientShape(options), RoundingOf(options)),
       unit_(static_cast<T>(options.unit_mm)) {}
 
 template <class T>

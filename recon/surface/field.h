@@ -48,6 +48,8 @@ struct FieldOptions {
   Activation sdf_activation = Activation::kSquareplus;
   int sdf_skip = 0;          // see MlpShape
   bool weight_norm = false;  // of the distance and the colour network
+  // Of the factors of the networks' products, forward and backward; sums and what is learnt stay float.
+  Precision network_precision = Precision::kFloat;
   std::vector<int> color_hidden = {32, 32};
   int features = 15;  // numbers that the distance network hands to the colour network
   double unit_mm = 68;

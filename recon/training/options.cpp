@@ -122,6 +122,7 @@ void ReadField(const ConfigTable& root, FieldOptions* field) {
     ReadChoice(*network, "sdf_activation", kActivationNames, &field->sdf_activation);
     field->sdf_skip = static_cast<int>(network->Integer("sdf_skip", field->sdf_skip, {0, 64}));
     field->weight_norm = network->Flag("weight_norm", field->weight_norm);
+    ReadChoice(*network, "precision", kPrecisionNames, &field->network_precision);
     field->features = static_cast<int>(network->Integer("features", field->features, {0, 1024}));
     field->unit_mm = network->Number("unit_mm", field->unit_mm, kPositive);
     const std::string name = network->Choice("reflectance", kReflectanceNames[int(field->reflectance)],
@@ -288,7 +289,8 @@ std::string FormatTrainOptions(const TrainOptions& o) {
       << kPrecisionNames[int(o.field.grid.precision)] << "\""
       << "\n\n[network]\nsdf_hidden = " << Array(o.field.sdf_hidden) << "\nsdf_activation = \""
       << kActivationNames[int(o.field.sdf_activation)] << "\"\nsdf_skip = " << o.field.sdf_skip
-      << "\nweight_norm = " << (o.field.weight_norm ? "true" : "false")
+      << "\nweight_norm = " << (o.field.weight_norm ? "true" : "false") << "\nprecision = \""
+      << kPrecisionNames[int(o.field.network_precision)] << "\""
       << "\nplace_octaves = " << o.field.place_octaves
       << "\ndirection_octaves = " << o.field.direction_octaves
       << "\ncolor_hidden = " << Array(o.field.color_hidden) << "\nfeatures = " << o.field.features
