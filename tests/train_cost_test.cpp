@@ -41,6 +41,7 @@ TEST(TrainKnobs, LeaveOutWhatTheRunDoesNotUse) {
   const auto paper = TrainKnobsOf(ReadTrainOptions("paper", {}), 40, false);
   EXPECT_TRUE(has(fast, "grid_levels"));
   EXPECT_FALSE(has(paper, "grid_levels"));
+  EXPECT_TRUE(has(fast, "network_precision") && has(paper, "network_precision"));
   EXPECT_TRUE(has(fast, "interreflection"));
   EXPECT_FALSE(has(paper, "interreflection"));
   // More frames than there are would be the same run again.

@@ -238,6 +238,28 @@ TEST(Train, TablesInBfloat16AreLearntInFloat) {
                          through.Weights() + tables));
 }
 
+// Steps are those of the state, for any number of threads; the loss is off by the networks' rounding alone,
+// of which photometric and eikonal terms take a few times 2⁻⁸.
+TEST(Train, ProductsInBfloat16FollowThoseInFloat) {
+  const auto options = [](const std::string& precision) {
+    return ReadTrainOptions("fast", {"sampling.rays=64", "network.precision=\"" + precision + "\""});
+  };
+  EXPECT_NE(FormatTrainOptions(options("bf16")), FormatTrainOptions(options("float")));
+  const TrainingFrames frames(test::SmallSequence(), 6, true);
+  Trainer whole(frames, options("float"), 5), rounded(frames, options("bf16"), 5),
+      again(frames, options("bf16"), 5);
+  for (int step = 0; step < 8; ++step) {
+    SetThreadCount(1);
+    const double expected = whole.Step(step / 10.0).loss.Sum(), found = rounded.Step(step / 10.0).loss.Sum();
+    SetThreadCount(2);
+    again.Step(step / 10.0);
+    EXPECT_NEAR(found, expected, 0.05 * expected) << step;
+    EXPECT_NE(found, expected);
+  }
+  SetThreadCount(0);
+  EXPECT_EQ(rounded.state().parameters, again.state().parameters);
+}
+
 // The fog's own sharpness at first, the schedule's from the fog's last step on; whichever of the two limits
 // comes first.
 TEST(Schedule, FogLiftsAndLeavesTheScheduleAsItWas) {
