@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+
 #include "common/random.h"
 #include "recon/training/trainer.h"
 #include "tests/small_sequence.h"
@@ -51,12 +53,15 @@ TEST(PoseRefinement, MotionsComeToPosesAndRaysAlike) {
 TEST(PoseRefinement, WhatAllFramesHaveInCommonStaysOut) {
   PoseMotions motions;
   motions.Resize(3);
+  std::vector<Pose> given(3, Pose::Identity());
+  given[1].translation() = Vec3d(1, 5, -20);
+  given[2].translation() = Vec3d(-3, 4, -31);
   std::vector<float> gradient(3 * kPoseNumbers);
   for (size_t i = 0; i < gradient.size(); ++i) gradient[i] = 1.0f + 0.5f * static_cast<float>(i % 5);
   for (int step = 1; step < 20; ++step) {
     std::vector<float> now = gradient;
     now[7] = step % 2 ? -1.0f : 2.0f;
-    UpdateMotions(AdamStep(0.1, step, 0.99), AdamStep(0.01, step, 0.99), &now, &motions);
+    UpdateMotions(AdamStep(0.01, step, 0.99), AdamStep(0.01, step, 0.99), given, &now, &motions);
     for (float g : now) EXPECT_EQ(g, 0);
   }
   float largest = 0;
@@ -69,6 +74,57 @@ TEST(PoseRefinement, WhatAllFramesHaveInCommonStaysOut) {
     EXPECT_NEAR(sum, 0, 1e-6);
   }
   EXPECT_GT(largest, 0.1);
+  // Nor has the path become longer: the similarity that best maps it back (Umeyama's, on centres) has no
+  // scale but that of motions across it, which is of second order.
+  std::vector<Pose> moved;
+  for (int frame = 0; frame < 3; ++frame) moved.push_back(Moved(given[frame], motions, frame));
+  const auto scale = [&](const std::vector<Pose>& from) {
+    Eigen::Matrix3d a, b;
+    for (int i = 0; i < 3; ++i) {
+      a.col(i) = from[i].translation();
+      b.col(i) = given[i].translation();
+    }
+    return std::cbrt(Eigen::umeyama(a, b, true).topLeftCorner<3, 3>().determinant());
+  };
+  EXPECT_NEAR(scale(moved), 1, 1e-3);
+  std::vector<Pose> longer = given;
+  for (Pose& pose : longer) pose.translation() *= 1.02;
+  EXPECT_NEAR(scale(longer), 1 / 1.02, 1e-9);
+}
+
+// Cameras at one place have no scale, and no motion that isn't a number.
+TEST(PoseRefinement, CamerasAtOnePlaceHaveNoScale) {
+  PoseMotions motions;
+  motions.Resize(4);
+  std::vector<float> gradient(4 * kPoseNumbers, 1.0f);
+  gradient[0] = 3;
+  UpdateMotions(AdamStep(0.1, 1, 0.99), AdamStep(0.01, 1, 0.99), std::vector<Pose>(4, Pose::Identity()),
+                &gradient, &motions);
+  EXPECT_LT(motions.values[0], -0.1);  // against the gradient
+  for (float value : motions.values) EXPECT_TRUE(std::isfinite(value));
+}
+
+// Against differences of what it is the gradient of.
+TEST(PoseRefinement, ThePullIsTheGradientOfSquaresInUnitsOfTheNoise) {
+  PoseMotions motions;
+  motions.Resize(2);
+  for (size_t i = 0; i < motions.values.size(); ++i)
+    motions.values[i] = 0.1f * static_cast<float>(i % 5) - 0.2f;
+  const auto loss = [&](size_t at, double step) {
+    double sum = 0;
+    for (size_t i = 0; i < motions.values.size(); ++i) {
+      const double value = motions.values[i] + (i == at ? step : 0);
+      const double square = i % 6 < 3 ? 0.5 * 0.5 / 3 : 0.01 * 0.01 / 3;
+      sum += 0.7 * value * value / square / 2 / 2;
+    }
+    return sum;
+  };
+  std::vector<float> gradient(motions.values.size(), 1.0f);
+  AddPull(0.7, {0.5, 0.01}, motions, &gradient);
+  for (size_t i = 0; i < gradient.size(); ++i) {
+    const double expected = (loss(i, 1e-3) - loss(i, -1e-3)) / 2e-3;
+    EXPECT_NEAR(gradient[i], 1 + expected, 1e-5 * (1 + std::abs(expected))) << i;
+  }
 }
 
 // Poses that are off by half a mm and half a degree come nearer to the true ones.

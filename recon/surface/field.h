@@ -149,8 +149,8 @@ class Field {
 
   // Between ColorBackward and SurfaceBackward: ∂loss/∂positions, 3 rows, by way of the signed distances, the
   // features and the colour network's own look at place. Left out: that normals change with place, which on
-  // a grid they do from cell to cell and not within (a part of it misleads: poses then err more than without
-  // it), and the ambient network, which is smooth. unused_gradient: room for the networks' parameters.
+  // a grid they do from cell to cell and not within (RayLoss compares those of neighbouring places), and the
+  // ambient network, which is smooth. unused_gradient: room for the networks' parameters.
   void PositionsBackward(const T* parameters, SurfacePass* pass, T* unused_gradient,
                          Panel<T>* positions_delta) const;
 

@@ -206,6 +206,9 @@ void ReadRest(const ConfigTable& root, TrainOptions* options) {
     p.translation_rate_mm = poses->Number("translation_rate_mm", p.translation_rate_mm, kPositive);
     p.rotation_rate_rad = poses->Number("rotation_rate_rad", p.rotation_rate_rad, kPositive);
     p.start = poses->Number("start", p.start, {0, 1});
+    p.noise_mm = poses->Number("noise_mm", p.noise_mm, kPositive);
+    p.noise_rad = poses->Number("noise_rad", p.noise_rad, kPositive);
+    p.pull = poses->Number("pull", p.pull, kNotNegative);
   }
   if (const auto extract = root.Optional("extract")) {
     options->extract_cell_mm = extract->Number("cell_mm", options->extract_cell_mm, {1e-3, 1e3});
@@ -328,7 +331,8 @@ std::string FormatTrainOptions(const TrainOptions& o) {
       << "\n\n[poses]\nrefine = " << (o.poses.refine ? "true" : "false")
       << "\ntranslation_rate_mm = " << o.poses.translation_rate_mm
       << "\nrotation_rate_rad = " << o.poses.rotation_rate_rad << "\nstart = " << o.poses.start
-      << "\n\n[extract]\ncell_mm = " << o.extract_cell_mm
+      << "\nnoise_mm = " << o.poses.noise_mm << "\nnoise_rad = " << o.poses.noise_rad
+      << "\npull = " << o.poses.pull << "\n\n[extract]\ncell_mm = " << o.extract_cell_mm
       << "\ncontinue_lumen = " << (o.continue_lumen ? "true" : "false") << "\n";
   return out.str();
 }

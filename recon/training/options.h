@@ -84,9 +84,15 @@ struct TrainOptions {
   struct Poses {
     bool refine = false;
     // Adam's, from `start` (a part of the run) on; from the middle of the run they fall to 0.
-    double translation_rate_mm = 2e-3;
-    double rotation_rate_rad = 5e-5;
-    double start = 0.2;  // earlier the surface is too far off to tell
+    double translation_rate_mm = 5e-3;
+    double rotation_rate_rad = 1.5e-4;
+    double start = 0.05;
+    // How far the given poses may be off, RMS over frames: frames are independent, so that their common
+    // drifts are less, and those are what pictures tell least of. `pull` times the mean of half the square of
+    // what a number moves by, in units of it, is added to the loss.
+    double noise_mm = 0.5;
+    double noise_rad = 0.005;
+    double pull = 1e-4;
   } poses;
 
   double extract_cell_mm = 0.75;

@@ -24,11 +24,23 @@ Pose Moved(const Pose& world_from_camera, const PoseMotions& motions, int frame)
 // The same motion of a ray of the frame.
 void Move(const PoseMotions& motions, RayBatch<float>::Ray* ray);
 
+// By how much given poses are off: root mean squares over frames of shift and turn.
+struct GivenPoseError {
+  double shift_mm, turn_rad;
+};
+
+// Adds the gradient of the pull to the given poses: weight times the mean over frames of half the squares of
+// all six numbers, each in units of its own root mean square.
+void AddPull(double weight, const GivenPoseError& noise, const PoseMotions& motions,
+             std::vector<float>* gradient);
+
 // A step against the gradient (kPoseNumbers a frame; cleared). What all frames' motions have in common is
-// taken out again, translations and rotations each. A common translation no picture tells of, the surface
-// would follow it. A common turn of every camera about its own place is no such freedom, but on a nearly
-// straight path hardly anything holds it: it is supposed to be none.
-void UpdateMotions(const AdamStep& translation, const AdamStep& rotation, std::vector<float>* gradient,
-                   PoseMotions* motions);
+// taken out again: the mean of the translations, that of the rotations, and, of the translations, what makes
+// the path longer or shorter about its middle. Of a common translation no picture tells, nor of a scale: a
+// lumen twice as large, four times as pale, seen from twice as far looks the same, and surface and path would
+// drift off together. A turn of all together is taken for a common turn of every camera about its own place:
+// the noise of the given poses leaves that to be none more surely than it does the path's direction.
+void UpdateMotions(const AdamStep& translation, const AdamStep& rotation, const std::vector<Pose>& given,
+                   std::vector<float>* gradient, PoseMotions* motions);
 
 }  // namespace lumen

@@ -326,6 +326,20 @@ LossTerms RayLoss<T>::Evaluate(const T* parameters, const RayBatch<T>& batch,
   return terms;
 }
 
+// Evaluate has the same in its loop: called from there it would round otherwise, and change every run's
+// bytes.
+template <class T>
+Vec3<T> RayLoss<T>::ByGradient(size_t i) const {
+  const Active& sample = active_[i];
+  if (!(sample.weight > 0) || !(sample.length > T(kShortestGradient))) return Vec3<T>::Zero();
+  const Vec3<T> gradient(surface_.gradient.At(0, i), surface_.gradient.At(1, i), surface_.gradient.At(2, i));
+  const Vec3<T> normal = gradient / sample.length;
+  Vec3<T> by_normal(surface_.normal_delta.At(0, i), surface_.normal_delta.At(1, i),
+                    surface_.normal_delta.At(2, i));
+  by_normal += sample.weight * shading_[i].by_normal.transpose() * radiance_delta_[sample.ray];
+  return (by_normal - normal * normal.dot(by_normal)) / sample.length;
+}
+
 template <class T>
 void RayLoss<T>::CoatBackward(const T* parameters, T* network_gradient) const {
   MucusCoat<T> delta{0, 0, 0};
@@ -339,26 +353,6 @@ void RayLoss<T>::CoatBackward(const T* parameters, T* network_gradient) const {
   const size_t begin = field_->coat_begin();
   LearntCoatBackward(field_->options().coat, parameters + begin, delta,
                      network_gradient + (begin - field_->grid_size()));
-}
-
-// Samples keep their places in the camera's axes, and so the light that comes to them from the moving guides.
-// That the light turns against normals which stay is left out with its counterpart, that other places have
-// other normals (PositionsBackward): the two make up for each other where the wall is smooth.
-template <class T>
-void RayLoss<T>::AddPoseGradient(const T* parameters, const RayBatch<T>& batch, T* pose_gradient) {
-  unused_gradient_.assign(field_->network_size(), T(0));
-  field_->PositionsBackward(parameters, &surface_, unused_gradient_.data(), &positions_delta_);
-  for (size_t i = 0; i < active_.size(); ++i) {
-    const auto& ray = batch.rays[active_[i].ray];
-    const T distance = batch.distance[size_t(active_[i].ray) * batch.samples + active_[i].sample];
-    const Vec3<T> by_place(positions_delta_.At(0, i), positions_delta_.At(1, i), positions_delta_.At(2, i));
-    const Vec3<T> by_rotation = (distance * ray.direction).cross(by_place);
-    T* sum = pose_gradient + ray.frame * kPoseNumbers;
-    for (int d = 0; d < 3; ++d) {
-      sum[d] += by_place[d];
-      sum[3 + d] += by_rotation[d];
-    }
-  }
 }
 
 template <class T>

@@ -80,7 +80,7 @@ class RayLoss {
   // Loss of a batch. Adds the gradient by the networks' parameters to network_gradient and by each frame's
   // log gain to log_gain_gradient; the grid's part waits for GridBackward. pose_gradient: null, or
   // kPoseNumbers a frame, to which is added the gradient by a motion of the frame's camera with its rays,
-  // their samples and its lights, normals standing still (Field::PositionsBackward).
+  // their samples and its lights. The ambient network stands still (Field::PositionsBackward).
   LossTerms Evaluate(const T* parameters, const RayBatch<T>& batch, const std::vector<FrameLight<T>>& lights,
                      const std::vector<T>& log_gain, const LossSettings<T>& settings, T* network_gradient,
                      T* log_gain_gradient, T* pose_gradient = nullptr);
@@ -115,7 +115,12 @@ class RayLoss {
   void ScaleByPower(T power);
   void PowerBackward(T* network_gradient) const;
   void CoatBackward(const T* parameters, T* network_gradient) const;
+  // ∂photometric loss/∂gradient of the SDF at an active sample.
+  Vec3<T> ByGradient(size_t i) const;
+  // pose_gradient.cpp.
   void AddPoseGradient(const T* parameters, const RayBatch<T>& batch, T* pose_gradient);
+  void LookBeside(const T* parameters);
+  void AddNormals(const T* parameters, const RayBatch<T>& batch, T* pose_gradient);
   void BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& settings, LossTerms* terms);
 
   const Field<T>* field_;
@@ -129,8 +134,12 @@ class RayLoss {
   std::vector<ByCoat<T>> by_coat_;          // likewise, if the field has_coat
   std::vector<Term<T>> pull_;               // on one of its outputs
   Panel<T> log_albedo_, log_albedo_slope_;  // of the colour network's outputs, if the field bounds_albedo
+  // Of the gradient by poses:
   Panel<T> positions_delta_;
   LineVector<T> unused_gradient_;
+  std::vector<Vec3<T>> by_gradient_;       // a ray: ByGradient, summed over its samples
+  std::vector<int> heaviest_;              // a ray: its active sample of the largest weight, or −1
+  typename Field<T>::SurfacePass beside_;  // on either side of it
 };
 
 }  // namespace lumen
