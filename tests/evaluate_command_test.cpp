@@ -7,6 +7,7 @@
 #include "common/files.h"
 #include "common/image.h"
 #include "common/mesh.h"
+#include "common/pose_file.h"
 #include "recon/evaluation/colormap.h"
 #include "recon/evaluation/evaluate.h"
 #include "recon/evaluation/evaluation_json.h"
@@ -69,6 +70,36 @@ TEST_F(EvaluateCommand, WritesTheTableTheJsonAndThePictures) {
   EXPECT_EQ(ReadMesh(scratch_ / "result" / "unseen.ply").vertices.size(), reconstruction_.vertices.size());
   EXPECT_NE(ReadFile(scratch_ / "out").find("by the reconstruction alone"), std::string::npos);
   EXPECT_NE(ReadFile(scratch_ / "out").find("surveyed         1.000    1.000    1.000"), std::string::npos);
+}
+
+// A run that is right but for where and how large its world is: the truth, and its cameras, by one
+// similarity.
+TEST_F(EvaluateCommand, AlignsByTheRunsPoses) {
+  const Mat3d turn = Eigen::AngleAxisd(0.03, Vec3d(1, 2, -1).normalized()).toRotationMatrix();
+  const auto moved = [&](const Vec3d& x) -> Vec3d { return 1.02 * (turn * x) + Vec3d(0.4, -0.2, 0.1); };
+  Mesh mesh = test::Cube(20, 6);
+  for (Vec3d& vertex : mesh.vertices) vertex = moved(vertex);
+  std::vector<Pose> poses;
+  for (const SequenceFrame& frame : sequence_.frames) {
+    Pose pose = frame.world_from_camera;
+    pose.linear() = turn * pose.linear();
+    pose.translation() = moved(pose.translation());
+    poses.push_back(pose);
+  }
+  CreateFolder(scratch_ / "run");
+  WriteMesh(scratch_ / "run" / "mesh.ply", mesh);
+  const std::string arguments =
+      Path("run/mesh.ply") + " " + Path("sequence") + " --align --json " + Path("json");
+  EXPECT_EQ(Run(arguments), 1);
+  EXPECT_NE(Err().find("poses.refine=true"), std::string::npos) << Err();
+  WriteFile(scratch_ / "run" / "pose.txt", PosesText(poses));
+  ASSERT_EQ(Run(arguments), 0) << Err();
+  const nlohmann::json json = nlohmann::json::parse(ReadFile(scratch_ / "json"));
+  EXPECT_GT(json["surveyed"]["mae_mm"], 0.2);              // as it lies
+  EXPECT_LT(json["aligned"]["surveyed"]["mae_mm"], 1e-4);  // floats in the PLY
+  EXPECT_NEAR(json["aligned"]["alignment"]["scale"], 1 / 1.02, 1e-6);
+  EXPECT_NEAR(json["aligned"]["alignment"]["turn_rad"], 0.03, 1e-6);
+  EXPECT_LT(json["aligned"]["alignment"]["rms_mm"], 1e-6);
 }
 
 TEST_F(EvaluateCommand, NamesWhatIsWrongInOneLine) {
