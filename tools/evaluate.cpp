@@ -103,8 +103,7 @@ nlohmann::json EvaluateAligned(const std::filesystem::path& file, Mesh reconstru
   const double turn_rad = Eigen::AngleAxisd(to_truth.rotation).angle();
   fmt::print(
       "\naligned by its poses: scaled by {:.5f}, turned by {:.3f}°, shifted by {:.3f} mm; they leave {:.3f} "
-      "mm "
-      "and {:.3f}° (RMS)\n",
+      "mm and {:.3f}° (RMS)\n",
       to_truth.scale, turn_rad * 180 / kPi, shift_mm, fit.rms_mm, fit.rms_rad * 180 / kPi);
   std::cout << ToTable(evaluation);
   nlohmann::json json = ToJson(evaluation);

@@ -6,13 +6,21 @@
 
 namespace lumen {
 
+// Keeps 0/0 away from parameters that have never had a gradient. The smallest float gradient whose square is
+// not lost is about 1e-22; a denominator this much smaller than any that counts leaves Adam scale-free, as
+// hash tables with their tiny gradients need it (Müller et al. 2022).
+inline constexpr double kLeastAdamEpsilon = 1e-15;
+
 struct AdamStep {
   float rate;
   // 1/(1 − β₁ᵗ) and 1/(1 − β₂ᵗ) of step t = 1, 2, …
   float first_correction, second_correction;
   float beta2;
+  // Added to the root of the second moment. With kLeastAdamEpsilon a step is as long whatever the gradient's
+  // scale; gradients far below a larger one move next to nothing.
+  float epsilon;
 
-  AdamStep(double rate, int64_t step, double beta2);
+  AdamStep(double rate, int64_t step, double beta2, double epsilon = kLeastAdamEpsilon);
 };
 
 inline constexpr double kAdamBeta1 = 0.9;

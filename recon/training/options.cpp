@@ -6,6 +6,7 @@
 #include "common/config.h"
 #include "common/error.h"
 #include "common/files.h"
+#include "recon/network/adam.h"
 
 namespace lumen {
 namespace {
@@ -192,6 +193,8 @@ void ReadRest(const ConfigTable& root, TrainOptions* options) {
     ReadChoice(*schedule, "decay", kDecayNames, &s.decay);
     s.warm_up = schedule->Number("warm_up", s.warm_up, {0, 0.999});
     s.adam_beta2 = schedule->Number("adam_beta2", s.adam_beta2, {0, 0.999999});
+    s.table_epsilon = schedule->Number("table_epsilon", s.table_epsilon, {kLeastAdamEpsilon, 1});
+    s.table_epsilon_from = schedule->Integer("table_epsilon_from", s.table_epsilon_from, {0, 1e12});
     s.sharpness_rate = schedule->Number("sharpness_rate", s.sharpness_rate, kNotNegative);
     s.sharpness_start_per_mm =
         schedule->Number("sharpness_start_per_mm", s.sharpness_start_per_mm, kPositive);
@@ -323,7 +326,9 @@ std::string FormatTrainOptions(const TrainOptions& o) {
       << "\nlearning_rate = " << o.schedule.learning_rate
       << "\nlearning_rate_final = " << o.schedule.learning_rate_final << "\ndecay = \""
       << kDecayNames[int(o.schedule.decay)] << "\"\nwarm_up = " << o.schedule.warm_up
-      << "\nadam_beta2 = " << o.schedule.adam_beta2 << "\nsharpness_rate = " << o.schedule.sharpness_rate
+      << "\nadam_beta2 = " << o.schedule.adam_beta2 << "\ntable_epsilon = " << o.schedule.table_epsilon
+      << "\ntable_epsilon_from = " << o.schedule.table_epsilon_from
+      << "\nsharpness_rate = " << o.schedule.sharpness_rate
       << "\nsharpness_start_per_mm = " << o.schedule.sharpness_start_per_mm
       << "\nsharpness_end_per_mm = " << o.schedule.sharpness_end_per_mm
       << "\nfog_per_mm = " << o.schedule.fog_per_mm << "\nfog_iterations = " << o.schedule.fog_iterations

@@ -69,6 +69,10 @@ struct TrainOptions {
     Decay decay = Decay::kExponential;
     double warm_up = 0;  // the part of the run over which the rate rises from 0
     double adam_beta2 = 0.99;
+    // The tables' epsilon from that iteration on (AdamStep). Entries that hardly a ray tells of move as far
+    // as any other without one: in tens of thousands of steps bubbles grow behind folds and the wall frays.
+    double table_epsilon = 1e-4;
+    int64_t table_epsilon_from = 8000;
     double sharpness_start_per_mm = 0.6;
     double sharpness_end_per_mm = 4.4;
     // Before that the wall is a fog of this sharpness, in which all of it can still move: it lifts, the

@@ -389,7 +389,11 @@ StepReport Trainer::Step(double progress) {
     return report;
   }
   const double rate = RateAt(progress);
-  const AdamStep step(rate, state_.iteration, options_.schedule.adam_beta2);
+  const auto& schedule = options_.schedule;
+  const AdamStep step(rate, state_.iteration, schedule.adam_beta2);
+  AdamStep table_step = step;
+  if (state_.iteration > schedule.table_epsilon_from)
+    table_step.epsilon = static_cast<float>(schedule.table_epsilon);
   const int levels = field_->grid().levels();
   ParallelFor(0, levels + 1, [&](int64_t task) {
     if (task == levels) return UpdateNetworks(step);
@@ -398,7 +402,7 @@ StepReport Trainer::Step(double progress) {
     for (Chunk& chunk : chunks_) chunk.workspace->loss.GridBackward(level, gradient_.data());
     free_space_->GridBackward(level, gradient_.data());
     const size_t begin = field_->grid().level_begin(level);
-    AdamUpdate(step, field_->grid().level_size(level), &state_.parameters[begin], &gradient_[begin],
+    AdamUpdate(table_step, field_->grid().level_size(level), &state_.parameters[begin], &gradient_[begin],
                &state_.first[begin], &state_.second[begin]);
   });
   UpdateGains(step);
