@@ -110,6 +110,7 @@ TEST(Continuation, WhatIsSeenStaysAsItIsLearnt) {
 TEST(Continuation, NothingGoesOnWhereThereIsNoTube) {
   const Tube tube;
   EXPECT_TRUE(Continuation::Fit(Points(tube), Cameras()));
+  EXPECT_TRUE(Continuation::Fit(Points(tube, 1.7 * kPi), Cameras())) << "a part behind a fold";
   EXPECT_FALSE(Continuation::Fit(Points(tube, kPi), Cameras())) << "half a wall";
   EXPECT_FALSE(Continuation::Fit(Points(tube), Cameras(1.5))) << "cameras that look everywhere";
   EXPECT_FALSE(Continuation::Fit({}, Cameras()));

@@ -17,6 +17,9 @@ constexpr double kBand_mm = 30;
 // Of all points so many in a thousand may lie where no wall is.
 constexpr double kStray = 0.002;
 constexpr int kFewInSector = 8;
+// Sectors that show less than that along the band, as behind a fold of a bend, don't tell of the tube; of the
+// others so many are needed.
+constexpr double kLeastAround = 0.75;
 
 // The cameras that say along which way the lumen goes on, behind the rest. A lumen bends, and the wall that
 // is seen lies too far ahead to tell; those who withdraw a camera look along the lumen.
@@ -111,7 +114,7 @@ void Continuation::FitTube(const std::vector<WallPoint>& points) {
 // Each point counts for both middles beside it, so that in between, too, none lies behind the frontier.
 bool Continuation::FindFrontier(const std::vector<WallPoint>& points) {
   std::array<int, kSectors> count{};
-  frontier_.fill(std::numeric_limits<double>::infinity());
+  frontier_.fill(kBand_mm);
   for (const WallPoint& point : points) {
     const Cylindrical at = In(point.place);
     const int sector = SectorOf(at.azimuth).first;
@@ -120,7 +123,9 @@ bool Continuation::FindFrontier(const std::vector<WallPoint>& points) {
       ++count[s];
     }
   }
-  return *std::min_element(count.begin(), count.end()) >= kFewInSector;
+  const auto told =
+      std::ranges::count_if(count, [](int points_there) { return points_there >= kFewInSector; });
+  return double(told) >= kLeastAround * kSectors;
 }
 
 std::optional<Continuation> Continuation::Fit(const std::vector<WallPoint>& points,
