@@ -10,12 +10,12 @@
 #include "common/files.h"
 #include "common/pose_file.h"
 #include "common/progress.h"
+#include "common/similarity.h"
 #include "recon/evaluation/depth_error.h"
 #include "recon/evaluation/evaluation_json.h"
 #include "recon/evaluation/evaluation_table.h"
 #include "recon/evaluation/light_error.h"
 #include "recon/evaluation/sheet.h"
-#include "tools/exchange/similarity.h"
 #include "tools/options.h"
 #include "tools/sequence_arguments.h"
 
@@ -90,8 +90,7 @@ nlohmann::json EvaluateAligned(const std::filesystem::path& file, Mesh reconstru
                                const Sequence& sequence, const EvaluateOptions& options) {
   const SimilarityFit fit = FitToSequence(file, sequence);
   const Similarity& to_truth = fit.similarity;
-  for (Vec3d& vertex : reconstruction.vertices)
-    vertex = to_truth.scale * (to_truth.rotation * vertex) + to_truth.translation;
+  for (Vec3d& vertex : reconstruction.vertices) vertex = Mapped(to_truth, vertex);
   const Evaluation evaluation = Evaluate(reconstruction, truth, sequence, options);
   Vec3d middle = Vec3d::Zero(), moved = Vec3d::Zero();
   const double share = 1.0 / static_cast<double>(sequence.frames.size());

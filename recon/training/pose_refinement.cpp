@@ -22,23 +22,8 @@ void TakeOutMean(std::vector<float>* numbers) {
   }
 }
 
-// Least squares: the part of the translations that lengthens the given places' distances from their mean. It
-// leaves the translations' mean as it is.
-void TakeOutScale(const std::vector<Pose>& given, std::vector<float>* numbers) {
-  Vec3d mean = Vec3d::Zero();
-  for (const Pose& pose : given) mean += pose.translation() / static_cast<double>(given.size());
-  double along = 0, squares = 0;
-  for (size_t frame = 0; frame < given.size(); ++frame) {
-    const Vec3d from_mean = given[frame].translation() - mean;
-    for (int d = 0; d < 3; ++d) along += from_mean[d] * (*numbers)[frame * kPoseNumbers + size_t(d)];
-    squares += from_mean.squaredNorm();
-  }
-  if (!(squares > 0)) return;  // cameras that are all at one place have no scale
-  for (size_t frame = 0; frame < given.size(); ++frame) {
-    const Vec3d longer = along / squares * (given[frame].translation() - mean);
-    for (int d = 0; d < 3; ++d) (*numbers)[frame * kPoseNumbers + size_t(d)] -= static_cast<float>(longer[d]);
-  }
-}
+// How far the scale drifts: by 2.8 to 4.4% in runs of a CT's colon with noise of 0.5 mm and 0.3°.
+constexpr double kScaleDrift = 0.03;
 
 }  // namespace
 
@@ -69,10 +54,9 @@ void AddPull(double weight, const GivenPoseError& noise, const PoseMotions& moti
   }
 }
 
-void UpdateMotions(const AdamStep& translation, const AdamStep& rotation, const std::vector<Pose>& given,
-                   std::vector<float>* gradient, PoseMotions* motions) {
+void UpdateMotions(const AdamStep& translation, const AdamStep& rotation, std::vector<float>* gradient,
+                   PoseMotions* motions) {
   TakeOutMean(gradient);
-  TakeOutScale(given, gradient);
   for (int frame = 0; frame < motions->frames(); ++frame) {
     for (int part = 0; part < 2; ++part) {
       const size_t at = static_cast<size_t>(frame * kPoseNumbers + 3 * part);
@@ -81,7 +65,31 @@ void UpdateMotions(const AdamStep& translation, const AdamStep& rotation, const 
     }
   }
   TakeOutMean(&motions->values);
-  TakeOutScale(given, &motions->values);
+}
+
+Similarity BackToGiven(const std::vector<Pose>& refined, const std::vector<Pose>& given,
+                       const GivenPoseError& noise) {
+  const auto count = static_cast<double>(given.size());
+  Vec3d given_mean = Vec3d::Zero(), refined_mean = Vec3d::Zero();
+  for (size_t i = 0; i < given.size(); ++i) {
+    given_mean += given[i].translation() / count;
+    refined_mean += refined[i].translation() / count;
+  }
+  double squares = 0;
+  for (const Pose& pose : given) squares += (pose.translation() - given_mean).squaredNorm();
+  Similarity back;
+  // Noise alone makes no path that could be followed.
+  if (!(squares > count * noise.shift_mm * noise.shift_mm)) {
+    back.translation = given_mean - refined_mean;
+    return back;
+  }
+  back = FitSimilarity(refined, given).similarity;
+  // One of three components of the noise lies along a straight path. The fit's scale has that variance; the
+  // mean of it and of no drift at all, each weighed by its own.
+  const double variance = noise.shift_mm * noise.shift_mm / 3 / squares;
+  back.scale = 1 + (back.scale - 1) * kScaleDrift * kScaleDrift / (kScaleDrift * kScaleDrift + variance);
+  back.translation = given_mean - back.scale * (back.rotation * refined_mean);
+  return back;
 }
 
 }  // namespace lumen

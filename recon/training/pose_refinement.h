@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/math.h"
+#include "common/similarity.h"
 #include "recon/network/adam.h"
 #include "recon/training/ray_loss.h"
 
@@ -34,13 +35,17 @@ struct GivenPoseError {
 void AddPull(double weight, const GivenPoseError& noise, const PoseMotions& motions,
              std::vector<float>* gradient);
 
-// A step against the gradient (kPoseNumbers a frame; cleared). What all frames' motions have in common is
-// taken out again: the mean of the translations, that of the rotations, and, of the translations, what makes
-// the path longer or shorter about its middle. Of a common translation no picture tells, nor of a scale: a
-// lumen twice as large, four times as pale, seen from twice as far looks the same, and surface and path would
-// drift off together. A turn of all together is taken for a common turn of every camera about its own place:
-// the noise of the given poses leaves that to be none more surely than it does the path's direction.
-void UpdateMotions(const AdamStep& translation, const AdamStep& rotation, const std::vector<Pose>& given,
-                   std::vector<float>* gradient, PoseMotions* motions);
+// A step against the gradient (kPoseNumbers a frame; cleared). The means over frames of the translations and
+// of the rotations are taken out again: of a common motion no picture tells, surface and path would drift
+// off.
+void UpdateMotions(const AdamStep& translation, const AdamStep& rotation, std::vector<float>* gradient,
+                   PoseMotions* motions);
+
+// What takes refined poses back to where the given ones are, as many. Of a scale no picture tells, either (a
+// lumen twice as large, four times as pale, seen from twice as far looks the same), and it drifts by some
+// percent; held fixed in each step it would hold up the poses on their way. The given path tells it as well
+// as its noise allows: by the less, the shorter it is, the less the drift is taken back.
+Similarity BackToGiven(const std::vector<Pose>& refined, const std::vector<Pose>& given,
+                       const GivenPoseError& noise);
 
 }  // namespace lumen

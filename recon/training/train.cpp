@@ -84,7 +84,7 @@ class Run {
                        ": training left no surface; check poses and light, or train longer");
     }
     WriteMesh(run_.folder / "mesh.ply", mesh);
-    if (options_.poses.refine) WriteFile(run_.folder / "pose.txt", PosesText(trainer_.Poses()));
+    if (options_.poses.refine) WriteFile(run_.folder / "pose.txt", PosesText(PosesNow()));
     return result_;
   }
 
@@ -183,7 +183,23 @@ class Run {
                                    options_.sampling, run_.seed);
       if (continuation) extract.continuation = &*continuation;
     }
-    return ExtractMesh(trainer_.field(), trainer_.Weights(), trainer_.origin(), extract);
+    Mesh mesh = ExtractMesh(trainer_.field(), trainer_.Weights(), trainer_.origin(), extract);
+    if (!options_.poses.refine) return mesh;
+    const Similarity back = FromRefined();
+    for (Vec3d& vertex : mesh.vertices) vertex = Mapped(back, vertex);
+    return mesh;
+  }
+
+  Similarity FromRefined() const {
+    return BackToGiven(trainer_.Poses(), frames_.world_from_camera(),
+                       {options_.poses.noise_mm, options_.poses.noise_rad});
+  }
+
+  std::vector<Pose> PosesNow() const {
+    std::vector<Pose> poses = trainer_.Poses();
+    const Similarity back = FromRefined();
+    for (Pose& pose : poses) pose = Mapped(back, pose);
+    return poses;
   }
 
   // A resumed run keeps what it had written.

@@ -318,8 +318,7 @@ void Trainer::UpdatePoses(double progress) {
   const double beta2 = options_.schedule.adam_beta2;
   AddPull(poses.pull, {poses.noise_mm, poses.noise_rad}, state_.poses, &gradient);
   UpdateMotions(AdamStep(poses.translation_rate_mm * decay, state_.iteration, beta2),
-                AdamStep(poses.rotation_rate_rad * decay, state_.iteration, beta2),
-                frames_.world_from_camera(), &gradient, &state_.poses);
+                AdamStep(poses.rotation_rate_rad * decay, state_.iteration, beta2), &gradient, &state_.poses);
 }
 
 std::vector<Pose> Trainer::Poses() const {

@@ -6,7 +6,7 @@
 
 #include "common/sequence.h"
 #include "tools/exchange/light_scale.h"
-#include "tools/exchange/similarity.h"
+#include "common/similarity.h"
 
 namespace lumen {
 

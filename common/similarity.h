@@ -14,6 +14,7 @@ struct Similarity {
   Vec3d translation = Vec3d::Zero();
 };
 
+Vec3d Mapped(const Similarity& similarity, const Vec3d& point);
 // The pose of a camera whose world is mapped.
 Pose Mapped(const Similarity& similarity, const Pose& world_from_camera);
 

@@ -1,4 +1,4 @@
-#include "tools/exchange/similarity.h"
+#include "common/similarity.h"
 
 #include <Eigen/SVD>
 #include <algorithm>
@@ -8,11 +8,14 @@
 
 namespace lumen {
 
+Vec3d Mapped(const Similarity& similarity, const Vec3d& point) {
+  return similarity.scale * (similarity.rotation * point) + similarity.translation;
+}
+
 Pose Mapped(const Similarity& similarity, const Pose& world_from_camera) {
   Pose mapped = Pose::Identity();
   mapped.linear() = similarity.rotation * world_from_camera.linear();
-  mapped.translation() =
-      similarity.scale * (similarity.rotation * world_from_camera.translation()) + similarity.translation;
+  mapped.translation() = Mapped(similarity, Vec3d(world_from_camera.translation()));
   return mapped;
 }
 
