@@ -153,5 +153,36 @@ TEST(Continuation, MeshGoesOnAndIsClosed) {
   for (const auto& [from, to] : edges) EXPECT_TRUE(edges.count({to, from}));
 }
 
+// A small lumen far ahead, and the tube by itself, which is larger: the one that is kept is around the places
+// inside.
+TEST(Continuation, MeshIsTheWallAroundThePlacesInside) {
+  FieldOptions options;
+  options.grid.levels = 2;
+  options.grid.log2_table_size = 8;
+  options.initial.radius_mm = 6;
+  options.initial.reach_mm = 4;
+  Pose far = Pose::Identity();
+  far.translation() = Vec3d(0, 0, 60);
+  const Eigen::AlignedBox3d box(Vec3d(-30, -30, -45), Vec3d(30, 30, 80));
+  const Field<float> field(options, InitialSurface(options.initial, {far}, Vec3d::Zero()), box);
+  const std::vector<float> nothing(field.parameter_count(), 0.0f);
+  const auto continuation = Continuation::Fit(Points(Tube()), Cameras());
+  ASSERT_TRUE(continuation);
+  ExtractOptions extract;
+  extract.cell_mm = 1.5;
+  extract.continuation = &*continuation;
+  const auto middle = [&] {
+    const Mesh mesh = ExtractMesh(field, nothing.data(), Vec3d::Zero(), extract);
+    Eigen::AlignedBox3d bounds;
+    for (const Vec3d& vertex : mesh.vertices) bounds.extend(vertex);
+    return bounds.center().z();
+  };
+  EXPECT_LT(middle(), 0);  // the largest
+  extract.inside = {far.translation()};
+  EXPECT_NEAR(middle(), 62, 1);
+  extract.inside = {Vec3d(0, 0, 30)};  // in neither: what rays meet there they would leave the wall by
+  EXPECT_LT(middle(), 0);
+}
+
 }  // namespace
 }  // namespace lumen

@@ -10,12 +10,16 @@ namespace lumen {
 struct ExtractOptions {
   double cell_mm = 0.75;
   const Continuation* continuation = nullptr;  // null: the field's own surface, wherever it is
+  // Places in the lumen, relative to the field's origin.
+  std::vector<Vec3d> inside;
 };
 
 // Marching tetrahedra (six to a cube, so that the mesh is a closed manifold by construction) on a lattice
 // over the field's box; only blocks that the surface passes through are looked at. Keeps the component that
-// encloses the largest volume. Vertices in world mm (`origin` is the field's), faces oriented away from the
-// lumen. Empty where the field has no surface. Throws InputError where the field is not finite.
+// most rays from the places inside meet first; where none is given or meets any, the one that encloses the
+// largest volume: that can be a blob beyond the wall, where nothing holds the field. Vertices in world mm
+// (`origin` is the field's), faces oriented away from the lumen. Empty where the field has no surface. Throws
+// InputError where the field is not finite.
 Mesh ExtractMesh(const Field<float>& field, const float* parameters, const Vec3d& origin,
                  const ExtractOptions& options);
 

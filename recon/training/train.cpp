@@ -177,6 +177,7 @@ class Run {
   Mesh MeshNow() {
     ExtractOptions extract;
     extract.cell_mm = options_.extract_cell_mm;
+    extract.inside = CameraPlaces();
     std::optional<Continuation> continuation;
     if (options_.continue_lumen) {
       continuation = ContinueLumen(frames_, trainer_.field(), trainer_.Weights(), trainer_.origin(),
@@ -267,13 +268,17 @@ class Run {
       Say(odd + "; lower schedule.learning_rate, train longer, or check poses, gains and light");
   }
 
+  // Relative to the field's origin.
+  std::vector<Vec3d> CameraPlaces() const {
+    std::vector<Vec3d> places;
+    for (const Pose& pose : trainer_.Poses()) places.push_back(pose.translation() - trainer_.origin());
+    return places;
+  }
+
   // What poses that are wrong, or a wall that was never seen, come to.
   void SayWhichCamerasAreOutside() {
-    std::vector<Vec3d> places;
-    for (const Pose& pose : frames_.world_from_camera())
-      places.push_back(pose.translation() - trainer_.origin());
     std::string outside;
-    for (size_t i : PlacesOutside(trainer_.field(), trainer_.Weights(), places))
+    for (size_t i : PlacesOutside(trainer_.field(), trainer_.Weights(), CameraPlaces()))
       outside += (outside.empty() ? "" : ", ") + std::to_string(frames_.number(static_cast<int>(i)));
     if (outside.empty()) return;
     Say("the cameras of these frames lie outside the reconstructed lumen; check their poses: " + outside);
