@@ -120,18 +120,35 @@ TEST(Continuation, NothingGoesOnWhereThereIsNoTube) {
   EXPECT_FALSE(Continuation::Fit(Points(tube), outside)) << "a camera in the wall";
 }
 
+// A field whose networks say nothing, in a box that a continued tube fits in: its surface is a tube about the
+// cameras' path.
+struct EmptyField {
+  EmptyField(double radius_mm, double reach_mm, const std::vector<Pose>& cameras)
+      : options(Options(radius_mm, reach_mm)),
+        field(options, InitialSurface(options.initial, cameras, Vec3d::Zero()),
+              {Vec3d(-30, -30, -45), Vec3d(30, 30, 80)}),
+        nothing(field.parameter_count(), 0.0f) {}
+  static FieldOptions Options(double radius_mm, double reach_mm) {
+    FieldOptions options;
+    options.grid.levels = 2;
+    options.grid.log2_table_size = 8;
+    options.initial.radius_mm = radius_mm;
+    options.initial.reach_mm = reach_mm;
+    return options;
+  }
+  Mesh Extract(const ExtractOptions& extract) const {
+    return ExtractMesh(field, nothing.data(), Vec3d::Zero(), extract);
+  }
+  FieldOptions options;
+  Field<float> field;
+  std::vector<float> nothing;
+};
+
 TEST(Continuation, MeshGoesOnAndIsClosed) {
   // The field's surface is a capsule of radius 18 that ends 18 mm behind the cameras.
-  FieldOptions options;
-  options.grid.levels = 2;
-  options.grid.log2_table_size = 8;
-  options.initial.radius_mm = 18;
-  options.initial.reach_mm = 40;
+  const EmptyField capsule(18, 40, Cameras());
   Tube tube;
   tube.bend_per_mm = tube.ellipse_mm = 0;
-  const Eigen::AlignedBox3d box(Vec3d(-30, -30, -45), Vec3d(30, 30, 80));
-  const Field<float> field(options, InitialSurface(options.initial, Cameras(), Vec3d::Zero()), box);
-  const std::vector<float> nothing(field.parameter_count(), 0.0f);
   const auto continuation = Continuation::Fit(Points(tube), Cameras());
   ASSERT_TRUE(continuation);
   const auto lowest = [](const Mesh& mesh) {
@@ -141,9 +158,9 @@ TEST(Continuation, MeshGoesOnAndIsClosed) {
   };
   ExtractOptions extract;
   extract.cell_mm = 1.5;
-  const Mesh without = ExtractMesh(field, nothing.data(), Vec3d::Zero(), extract);
+  const Mesh without = capsule.Extract(extract);
   extract.continuation = &*continuation;
-  const Mesh with = ExtractMesh(field, nothing.data(), Vec3d::Zero(), extract);
+  const Mesh with = capsule.Extract(extract);
   EXPECT_NEAR(lowest(without), -18, 1.5);
   // Seen from 4 mm on; half a ball of 18 mm after 20 mm of tube.
   EXPECT_NEAR(lowest(with), 4 - Continuation::kReach_mm - 18, 1.5);
@@ -156,23 +173,16 @@ TEST(Continuation, MeshGoesOnAndIsClosed) {
 // A small lumen far ahead, and the tube by itself, which is larger: the one that is kept is around the places
 // inside.
 TEST(Continuation, MeshIsTheWallAroundThePlacesInside) {
-  FieldOptions options;
-  options.grid.levels = 2;
-  options.grid.log2_table_size = 8;
-  options.initial.radius_mm = 6;
-  options.initial.reach_mm = 4;
   Pose far = Pose::Identity();
   far.translation() = Vec3d(0, 0, 60);
-  const Eigen::AlignedBox3d box(Vec3d(-30, -30, -45), Vec3d(30, 30, 80));
-  const Field<float> field(options, InitialSurface(options.initial, {far}, Vec3d::Zero()), box);
-  const std::vector<float> nothing(field.parameter_count(), 0.0f);
+  const EmptyField small(6, 4, {far});
   const auto continuation = Continuation::Fit(Points(Tube()), Cameras());
   ASSERT_TRUE(continuation);
   ExtractOptions extract;
   extract.cell_mm = 1.5;
   extract.continuation = &*continuation;
   const auto middle = [&] {
-    const Mesh mesh = ExtractMesh(field, nothing.data(), Vec3d::Zero(), extract);
+    const Mesh mesh = small.Extract(extract);
     Eigen::AlignedBox3d bounds;
     for (const Vec3d& vertex : mesh.vertices) bounds.extend(vertex);
     return bounds.center().z();

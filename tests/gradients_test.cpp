@@ -240,6 +240,21 @@ void PrintTo(const LookOfWall& look, std::ostream* out) {
   *out << "reflectance " << int(look.reflectance) << " interreflection " << int(look.interreflection)
        << (look.bounded ? " bounded" : "") << (look.as_paper ? " as the paper's" : "");
 }
+
+// Of the first frame, with all channels exact.
+RayBatch<double>::Ray RandomRay(uint64_t& state, const Vec3d& origin, double exposure,
+                                const Vec3d& observed) {
+  RayBatch<double>::Ray ray;
+  ray.origin = origin;
+  ray.direction = Vec3d(Random(state), Random(state), 1.2).normalized();
+  ray.frame = 0;
+  ray.exposure = exposure;
+  ray.floor = 1e-6;
+  ray.observed = observed;
+  ray.bound = {PixelBound::kExact, PixelBound::kExact, PixelBound::kExact};
+  ray.eikonal_sample = 2;
+  return ray;
+}
 class RayLossGradient : public testing::TestWithParam<LookOfWall> {};
 
 TEST_P(RayLossGradient, MatchesFiniteDifferences) {
@@ -280,16 +295,7 @@ TEST_P(RayLossGradient, MatchesFiniteDifferences) {
   RayBatch<double> batch;
   batch.samples = 12;
   for (int r = 0; r < 6; ++r) {
-    RayBatch<double>::Ray ray;
-    ray.origin = Vec3d(0.3, 0.1, -0.2);
-    ray.direction = Vec3d(Random(state), Random(state), 1.2).normalized();
-    ray.frame = 0;
-    ray.exposure = 1.3;
-    ray.floor = 1e-6;
-    ray.observed = Vec3d(0.5, 0.4, 0.3);
-    ray.bound = {PixelBound::kExact, PixelBound::kExact, PixelBound::kExact};
-    ray.eikonal_sample = 2;
-    batch.rays.push_back(ray);
+    batch.rays.push_back(RandomRay(state, Vec3d(0.3, 0.1, -0.2), 1.3, Vec3d(0.5, 0.4, 0.3)));
     for (int k = 0; k < 12; ++k) batch.distance.push_back(1 + 1.2 * k + 0.3 * Random(state));
   }
   LossSettings<double> settings{0.9, 1 / 2.2, 0.1, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0 / 6};
@@ -464,16 +470,7 @@ TEST(PoseGradient, MatchesFiniteDifferences) {
   RayBatch<double> start;
   start.samples = 12;
   for (int r = 0; r < 6; ++r) {
-    RayBatch<double>::Ray ray;
-    ray.origin = Vec3d::Zero();
-    ray.direction = Vec3d(Random(state), Random(state), 1.2).normalized();
-    ray.frame = 0;
-    ray.exposure = 1;
-    ray.floor = 1e-6;
-    ray.observed = looks;
-    ray.bound = {PixelBound::kExact, PixelBound::kExact, PixelBound::kExact};
-    ray.eikonal_sample = 2;
-    start.rays.push_back(ray);
+    start.rays.push_back(RandomRay(state, Vec3d::Zero(), 1, looks));
     for (int k = 0; k < 12; ++k) start.distance.push_back(1 + 1.2 * k + 0.3 * Random(state));
   }
   for (int row = 0; row < 10; ++row) {
@@ -528,16 +525,7 @@ TEST(PoseGradient, FollowsTheNormalsOfALitWall) {
   constexpr int kRays = 20;
   start.samples = 400;  // 0.06 mm apart: a tenth of the wall's thickness
   for (int r = 0; r < kRays; ++r) {
-    RayBatch<double>::Ray ray;
-    ray.origin = Vec3d::Zero();
-    ray.direction = Vec3d(Random(state), Random(state), 1.2).normalized();
-    ray.frame = 0;
-    ray.exposure = 1;
-    ray.floor = 1e-6;
-    ray.observed = Vec3d(0.3, 0.1, 0.2);
-    ray.bound = {PixelBound::kExact, PixelBound::kExact, PixelBound::kExact};
-    ray.eikonal_sample = 2;
-    start.rays.push_back(ray);
+    start.rays.push_back(RandomRay(state, Vec3d::Zero(), 1, Vec3d(0.3, 0.1, 0.2)));
     for (int k = 0; k < start.samples; ++k) start.distance.push_back(1 + 0.06 * k);
   }
   const LossSettings<double> settings{8, 1 / 2.2, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0 / kRays};

@@ -32,6 +32,13 @@ constexpr int kRounds = 12;
 // Pull of all but the mean radius and place to nothing, in parts of all points' weight.
 constexpr double kRidge = 0.01;
 
+// How far a bend has taken the middle of a section, in parts of what it takes it over kBand_mm: a parabola
+// that leaves the axis gently where what is seen begins, and nothing behind that.
+double BendAt(double along) {
+  const double ahead = std::max(along / kBand_mm, 0.0);
+  return ahead * ahead;
+}
+
 double Smoothstep(double x) {
   x = std::clamp(x, 0.0, 1.0);
   return x * x * (3 - 2 * x);
@@ -39,11 +46,7 @@ double Smoothstep(double x) {
 
 }  // namespace
 
-// Of a section: behind what is seen on the axis, ahead of that on a parabola that leaves it gently.
-Vec2d Continuation::Middle(double along) const {
-  const double ahead = std::max(along / kBand_mm, 0.0);
-  return middle_ + ahead * ahead * bend_;
-}
+Vec2d Continuation::Middle(double along) const { return middle_ + BendAt(along) * bend_; }
 
 Continuation::Cylindrical Continuation::In(const Vec3d& place) const {
   const Vec3d from = place - origin_;
@@ -88,11 +91,10 @@ void Continuation::FitTube(const std::vector<WallPoint>& points) {
     double weight = 0;
     for (size_t i = 0; i < points.size(); ++i) {
       const auto [along, off, azimuth] = In(points[i].place);
-      const double c = std::cos(azimuth), s = std::sin(azimuth), ahead = std::max(along / kBand_mm, 0.0),
-                   square = ahead * ahead;
+      const double c = std::cos(azimuth), s = std::sin(azimuth), bend = BendAt(along);
       Vector row;
       row << 1, std::cos(2 * azimuth), std::sin(2 * azimuth), std::cos(3 * azimuth), std::sin(3 * azimuth), c,
-          s, square * c, square * s;
+          s, bend * c, bend * s;
       const double share = points[i].area * trust[i];
       squares += share * row * row.transpose();
       right += share * (off + Middle(along).dot(Vec2d(c, s))) * row;

@@ -34,8 +34,6 @@ class Continuation {
   // The signed distance at a place, mm, of which the field itself says `learnt`.
   double Blend(const Vec3d& place, double learnt) const;
 
-  const Vec3d& axis() const { return frame_[2]; }
-
  private:
   static constexpr int kSectors = 32, kShapes = 5, kNumbers = kShapes + 4;
   using Vector = Eigen::Matrix<double, kNumbers, 1>;
@@ -44,7 +42,7 @@ class Continuation {
     double along, off, azimuth;  // mm, mm from the middle of the section there, rad
   };
   Cylindrical In(const Vec3d& place) const;
-  Vec2d Middle(double along) const;
+  Vec2d Middle(double along) const;  // of a section, across the axis
   double Radius(double azimuth_rad) const;
   double Frontier(double azimuth_rad) const;
   // The sector whose middle is the last before that azimuth, and the part of the way to the next one's.

@@ -6,7 +6,7 @@
 namespace lumen {
 namespace {
 
-// A sector of a sixteenth of the wall that the frames see last has dozens of them.
+// Of the wall that the frames see last each sector of Continuation has dozens of them.
 constexpr int kRays = 16384;
 
 // A ray stands for as much wall as its pixel covers, which has no bound at grazing incidence.

@@ -10,7 +10,8 @@
 
 namespace lumen {
 
-// From what `rays` of the frames' pixels meet, chosen by `seed`: relative to the field's origin.
+// Relative to the field's origin, which `origin` is in the world, mm; from what rays of the frames' pixels
+// meet, which `seed` chooses. Nothing where Continuation::Fit finds none.
 std::optional<Continuation> ContinueLumen(const TrainingFrames& frames, const Field<float>& field,
                                           const float* parameters, const Vec3d& origin,
                                           const TrainOptions::Sampling& sampling, uint64_t seed);
