@@ -33,7 +33,9 @@ QuickSurface LearnQuickSurface(const Sequence& sequence, const QuickSurfaceOptio
         ": no surface can be learnt, half of the steps had no finite gradient; check poses and light");
   }
   surface.log_gain.assign(trainer.state().log_gain.begin(), trainer.state().log_gain.end());
-  surface.mesh = ExtractMesh(trainer.field(), trainer.Weights(), trainer.origin(), {options.cell_mm});
+  ExtractOptions extract;
+  extract.cell_mm = options.cell_mm;
+  surface.mesh = ExtractMesh(trainer.field(), trainer.Weights(), trainer.origin(), extract);
   if (surface.mesh.faces.empty()) {
     throw InputError(sequence.folder.string() + ": no surface can be learnt; check poses and light");
   }

@@ -87,36 +87,42 @@ void Grid<T>::Locate(const Level& level, const T* positions, Cell* cell) const {
       cell->fraction[d][s] = fraction;
     }
   }
+  // What the lower and the upper corner along an axis bring to the place of an entry.
+  alignas(64) uint32_t part[3][2][kTile];
+  const uint32_t row = level.corners[0], slice = level.corners[0] * level.corners[1];
+  // The primes of Müller et al.
+  const uint32_t factor[3] = {1, level.dense ? row : 2654435761u, level.dense ? slice : 805459861u};
+  for (int d = 0; d < 3; ++d) {
+    for (int s = 0; s < kTile; ++s) {
+      part[d][0][s] = static_cast<uint32_t>(base[d][s]) * factor[d];
+      part[d][1][s] = part[d][0][s] + factor[d];
+    }
+  }
   for (int c = 0; c < 8; ++c) {
-    const int32_t dx = c & 1, dy = (c >> 1) & 1, dz = c >> 2;
+    const uint32_t *x = part[0][c & 1], *y = part[1][(c >> 1) & 1], *z = part[2][c >> 2];
     if (level.dense) {
-      const int32_t row = level.corners[0], slice = level.corners[0] * level.corners[1];
-      for (int s = 0; s < kTile; ++s) {
-        cell->entry[c][s] = base[0][s] + dx + row * (base[1][s] + dy) + slice * (base[2][s] + dz);
-      }
+      for (int s = 0; s < kTile; ++s) cell->entry[c][s] = static_cast<int32_t>(x[s] + y[s] + z[s]);
     } else {
-      // The primes of Müller et al.
       const uint32_t mask = level.entries - 1;
-      for (int s = 0; s < kTile; ++s) {
-        const uint32_t hash = static_cast<uint32_t>(base[0][s] + dx) ^
-                              static_cast<uint32_t>(base[1][s] + dy) * 2654435761u ^
-                              static_cast<uint32_t>(base[2][s] + dz) * 805459861u;
-        cell->entry[c][s] = static_cast<int32_t>(hash & mask);
-      }
+      for (int s = 0; s < kTile; ++s) cell->entry[c][s] = static_cast<int32_t>((x[s] ^ y[s] ^ z[s]) & mask);
     }
   }
 }
 
-// An entry is moved as one: gather instructions fetch its numbers one by one, and are slow on processors that
-// guard them against speculation.
+// kRun entries that lie side by side are moved as one: gather instructions fetch their numbers one by one, and
+// are slow on processors that guard them against speculation. A dense level has both ends of each of a cell's
+// edges along x side by side.
 template <class T>
-void Grid<T>::FetchWhole(const T* table, const Cell& cell, Corners* corners) {
-  alignas(64) T entries[kTile * kFeatures];
-  for (int c = 0; c < 8; ++c) {
+template <int kRun>
+void Grid<T>::FetchRuns(const T* table, const Cell& cell, Corners* corners) {
+  constexpr int kNumbers = kRun * kFeatures;
+  alignas(64) T runs[kTile * kNumbers];
+  for (int c = 0; c < 8; c += kRun) {
     for (int s = 0; s < kTile; ++s)
-      std::memcpy(&entries[kFeatures * s], table + kFeatures * cell.entry[c][s], kFeatures * sizeof(T));
+      std::memcpy(&runs[kNumbers * s], table + kFeatures * cell.entry[c][s], kNumbers * sizeof(T));
     for (int s = 0; s < kTile; ++s)
-      for (int f = 0; f < kFeatures; ++f) corners->value[f][c][s] = entries[kFeatures * s + f];
+      for (int i = 0; i < kNumbers; ++i)
+        corners->value[i % kFeatures][c + i / kFeatures][s] = runs[kNumbers * s + i];
   }
 }
 
@@ -137,23 +143,39 @@ void Grid<T>::FetchPacked(const T* table, const Cell& cell, Corners* corners) {
 
 // And the way back: table += numbers, for the first `samples` of the tile.
 template <class T>
-void Grid<T>::Scatter(const Corners& corners, const Cell& cell, int samples, T* table) {
-  typedef T Entry __attribute__((vector_size(kFeatures * sizeof(T))));
-  alignas(64) T entries[8][kTile * kFeatures];
-  for (int c = 0; c < 8; ++c) {
+template <int kRun>
+void Grid<T>::ScatterRuns(const Corners& corners, const Cell& cell, int samples, T* table) {
+  constexpr int kNumbers = kRun * kFeatures;
+  typedef T Run __attribute__((vector_size(kNumbers * sizeof(T))));
+  alignas(64) T runs[8 / kRun][kTile * kNumbers];
+  for (int r = 0; r < 8 / kRun; ++r) {
     for (int s = 0; s < kTile; ++s)
-      for (int f = 0; f < kFeatures; ++f) entries[c][kFeatures * s + f] = corners.value[f][c][s];
+      for (int i = 0; i < kNumbers; ++i)
+        runs[r][kNumbers * s + i] = corners.value[i % kFeatures][r * kRun + i / kFeatures][s];
   }
   for (int s = 0; s < samples; ++s) {
-    for (int c = 0; c < 8; ++c) {
-      T* entry = table + kFeatures * cell.entry[c][s];
-      Entry sum, part;
-      std::memcpy(&sum, entry, sizeof(Entry));
-      std::memcpy(&part, &entries[c][kFeatures * s], sizeof(Entry));
+    for (int r = 0; r < 8 / kRun; ++r) {
+      T* entry = table + kFeatures * cell.entry[r * kRun][s];
+      Run sum, part;
+      std::memcpy(&sum, entry, sizeof(Run));
+      std::memcpy(&part, &runs[r][kNumbers * s], sizeof(Run));
       sum += part;
-      std::memcpy(entry, &sum, sizeof(Entry));
+      std::memcpy(entry, &sum, sizeof(Run));
     }
   }
+}
+
+template <class T>
+void Grid<T>::Fetch(const Level& level, const T* tables, const Cell& cell, Corners* corners) const {
+  const T* table = tables + level.offset;
+  if (packed_) return FetchPacked(table, cell, corners);
+  level.dense ? FetchRuns<2>(table, cell, corners) : FetchRuns<1>(table, cell, corners);
+}
+
+template <class T>
+void Grid<T>::Scatter(const Level& level, const Corners& corners, const Cell& cell, int samples, T* tables) {
+  T* table = tables + level.offset;
+  level.dense ? ScatterRuns<2>(corners, cell, samples, table) : ScatterRuns<1>(corners, cell, samples, table);
 }
 
 template <class T>
@@ -163,7 +185,7 @@ void Grid<T>::Encode(const T* tables, const Panel<T>& positions, Panel<T>* encod
   for (int tile = 0; tile < positions.tiles(); ++tile) {
     for (int l = 0; l < levels(); ++l) {
       Locate(levels_[l], positions.Tile(tile), &cell);
-      Fetch(tables + levels_[l].offset, cell, &corners);
+      Fetch(levels_[l], tables, cell, &corners);
       for (int f = 0; f < kFeatures; ++f) {
         const auto& value = corners.value[f];
         T* out = encoding->Row(tile, l * kFeatures + f);
@@ -190,7 +212,7 @@ void Grid<T>::EncodeWithJacobian(const T* tables, const Panel<T>& positions, Pan
     for (int l = 0; l < levels(); ++l) {
       const T inverse_cell = levels_[l].inverse_cell;
       Locate(levels_[l], positions.Tile(tile), &cell);
-      Fetch(tables + levels_[l].offset, cell, &corners);
+      Fetch(levels_[l], tables, cell, &corners);
       for (int f = 0; f < kFeatures; ++f) {
         const auto& value = corners.value[f];
         const int row = l * kFeatures + f;
@@ -222,7 +244,6 @@ template <bool kSecondOrder>
 void Grid<T>::BackwardImpl(int l, const Panel<T>& positions, const Panel<T>& delta, const Panel<T>* pull,
                            const Panel<T>* direction, int count, T* gradient) const {
   const Level& level = levels_[l];
-  T* table = gradient + level.offset;
   Cell cell;
   Corners share;
   for (int tile = 0; tile * kTile < count; ++tile) {
@@ -246,7 +267,7 @@ void Grid<T>::BackwardImpl(int l, const Panel<T>& positions, const Panel<T>& del
         }
       }
     }
-    Scatter(share, cell, std::min(kTile, count - tile * kTile), table);
+    Scatter(level, share, cell, std::min(kTile, count - tile * kTile), gradient);
   }
 }
 

@@ -72,12 +72,13 @@ class Grid {
   struct Cell;  // where the samples of a tile lie in a level
   void Locate(const Level& level, const T* positions, Cell* cell) const;
   struct Corners;  // the numbers there
-  void Fetch(const T* table, const Cell& cell, Corners* corners) const {
-    packed_ ? FetchPacked(table, cell, corners) : FetchWhole(table, cell, corners);
-  }
-  static void FetchWhole(const T* table, const Cell& cell, Corners* corners);
+  void Fetch(const Level& level, const T* tables, const Cell& cell, Corners* corners) const;
+  template <int kRun>
+  static void FetchRuns(const T* table, const Cell& cell, Corners* corners);
   static void FetchPacked(const T* table, const Cell& cell, Corners* corners);
-  static void Scatter(const Corners& corners, const Cell& cell, int samples, T* table);
+  static void Scatter(const Level& level, const Corners& corners, const Cell& cell, int samples, T* tables);
+  template <int kRun>
+  static void ScatterRuns(const Corners& corners, const Cell& cell, int samples, T* table);
   template <bool kSecondOrder>
   void BackwardImpl(int level, const Panel<T>& positions, const Panel<T>& delta, const Panel<T>* pull,
                     const Panel<T>* direction, int count, T* gradient) const;

@@ -140,19 +140,17 @@ void AccumulateWideTile(const Panel<T>& y, const Panel<T>& x, int tile, T* gradi
 
 template <class T>
 void AccumulateGroup(const Panel<T>& y, const Panel<T>& x, TileRange tiles, T* gradient) {
+  constexpr int kBlock = 4;
   const int outputs = y.rows();
   const int inputs = x.rows();
-  for (int o = 0; o < outputs; o += 4) {
-    for (int i = 0; i < inputs; i += 4) {
-      T* block = gradient + size_t(o) * inputs + i;
-      if (o + 4 <= outputs && i + 4 <= inputs) {
-        AccumulateBlock<T, 4, 4>(y, o, x, i, tiles, block);
-      } else {
-        for (int oo = o; oo < std::min(o + 4, outputs); ++oo)
-          for (int ii = i; ii < std::min(i + 4, inputs); ++ii)
-            AccumulateBlock<T, 1, 1>(y, oo, x, ii, tiles, gradient + size_t(oo) * inputs + ii);
+  for (int o = 0; o < outputs; o += kBlock) {
+    WithConstantRows<kBlock>(std::min(kBlock, outputs - o), [&](auto rows) {
+      for (int i = 0; i < inputs; i += kBlock) {
+        WithConstantRows<kBlock>(std::min(kBlock, inputs - i), [&](auto columns) {
+          AccumulateBlock<T, rows, columns>(y, o, x, i, tiles, gradient + size_t(o) * inputs + i);
+        });
       }
-    }
+    });
   }
 }
 

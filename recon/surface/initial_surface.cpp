@@ -55,8 +55,8 @@ InitialSurface::InitialSurface(const InitialSurfaceOptions& options,
   }
 }
 
-template <class T>
-void InitialSurface::Evaluate(const T* positions, T* value, T* gradient) const {
+template <class T, bool kGradient>
+void InitialSurface::EvaluateTile(const T* positions, T* value, T* gradient) const {
   alignas(64) T best[kTile];
   alignas(64) T offset[3][kTile] = {};
   std::fill(best, best + kTile, std::numeric_limits<T>::max());
@@ -74,6 +74,7 @@ void InitialSurface::Evaluate(const T* positions, T* value, T* gradient) const {
       const T distance2 = dx * dx + dy * dy + dz * dz;
       const bool nearer = distance2 < best[s];
       best[s] = nearer ? distance2 : best[s];
+      if constexpr (!kGradient) continue;
       offset[0][s] = nearer ? dx : offset[0][s];
       offset[1][s] = nearer ? dy : offset[1][s];
       offset[2][s] = nearer ? dz : offset[2][s];
@@ -84,9 +85,15 @@ void InitialSurface::Evaluate(const T* positions, T* value, T* gradient) const {
     value[s] = static_cast<T>(radius_mm_) - distance;
     best[s] = distance > 0 ? -1 / distance : T(0);
   }
-  if (!gradient) return;
+  if constexpr (!kGradient) return;
   for (int d = 0; d < 3; ++d)
     for (int s = 0; s < kTile; ++s) gradient[d * kTile + s] = offset[d][s] * best[s];
+}
+
+template <class T>
+void InitialSurface::Evaluate(const T* positions, T* value, T* gradient) const {
+  gradient ? EvaluateTile<T, true>(positions, value, gradient)
+           : EvaluateTile<T, false>(positions, value, gradient);
 }
 
 std::vector<Vec3d> InitialSurface::Spine(double step_mm) const {

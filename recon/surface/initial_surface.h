@@ -44,6 +44,9 @@ class InitialSurface {
   std::vector<Vec3d> Spine(double step_mm) const;
 
  private:
+  template <class T, bool kGradient>
+  void EvaluateTile(const T* positions, T* value, T* gradient) const;
+
   bool is_learnt_;
   double radius_mm_;
   std::vector<Vec3d> starts_, spans_;  // mm

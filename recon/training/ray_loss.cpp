@@ -52,10 +52,14 @@ void RayLoss<T>::SelectActive(const RayBatch<T>& batch, const LossSettings<T>& s
     for (int k = 0; k < n; ++k) {
       const size_t i = r * n + k;
       // A sample's own weight, and the light that a change of its distance could still take away.
-      const T influence = transmittance_[i] * Sigmoid(-settings.sharpness * signed_distance_[i]);
-      const bool seen = weight_[i] >= settings.weight_threshold || influence >= settings.weight_threshold;
+      bool seen = weight_[i] >= settings.weight_threshold;
+      // The latter is at most its transmittance, which spares most samples the exponential.
+      if (!seen && transmittance_[i] >= settings.weight_threshold) {
+        const T influence = transmittance_[i] * Sigmoid(-settings.sharpness * signed_distance_[i]);
+        seen = influence >= settings.weight_threshold;
+      }
       if (!seen && k != batch.rays[r].eikonal_sample) continue;
-      active_.push_back({static_cast<int>(r), k, seen ? weight_[i] : T(0), T(0)});
+      active_.push_back({static_cast<int>(r), k, seen ? weight_[i] : T(0)});
     }
   }
 }
@@ -72,18 +76,25 @@ void RayLoss<T>::ShadeActive(const T* parameters, const RayBatch<T>& batch,
     const Active& sample = active_[std::min(i, count - 1)];
     const auto& ray = batch.rays[sample.ray];
     const T t = batch.distance[size_t(sample.ray) * batch.samples + sample.sample];
+    T* position = surface_.positions.Tile(i / kTile) + i % kTile;
+    T* direction = surface_.directions.Tile(i / kTile) + i % kTile;
     for (int d = 0; d < 3; ++d) {
-      surface_.positions.At(d, i) = ray.origin[d] + t * ray.direction[d];
-      surface_.directions.At(d, i) = ray.direction[d];
+      position[d * kTile] = ray.origin[d] + t * ray.direction[d];
+      direction[d * kTile] = ray.direction[d];
     }
   }
   field_->Surface(parameters, &surface_);
-  for (int i = 0; i < tiles * kTile; ++i) {
-    Vec3<T> gradient(surface_.gradient.At(0, i), surface_.gradient.At(1, i), surface_.gradient.At(2, i));
-    const T length = gradient.norm();
-    if (i < count) active_[i].length = length;
-    if (length > 0) gradient /= length;
-    for (int d = 0; d < 3; ++d) surface_.normal.At(d, i) = gradient[d];
+  length_.resize(size_t(tiles) * kTile);
+  for (int tile = 0; tile < tiles; ++tile) {
+    const T* gradient = surface_.gradient.Tile(tile);
+    T* normal = surface_.normal.Tile(tile);
+    T* length = &length_[size_t(tile) * kTile];
+    for (int s = 0; s < kTile; ++s) {
+      const T x = gradient[s], y = gradient[kTile + s], z = gradient[2 * kTile + s];
+      length[s] = std::sqrt(x * x + (z * z + y * y));
+      const T divisor = length[s] > 0 ? length[s] : T(1);
+      for (int d = 0; d < 3; ++d) normal[d * kTile + s] = gradient[d * kTile + s] / divisor;
+    }
   }
   field_->Color(parameters, &surface_);
   if (field_->bounds_albedo()) BoundAlbedo(surface_.color_output());
@@ -127,7 +138,7 @@ std::vector<typename RayLoss<T>::Wall> RayLoss<T>::LookAtLast(const T* parameter
                                                               const std::vector<T>& log_gain) {
   active_.clear();
   for (size_t r = 0; r < batch.rays.size(); ++r)
-    active_.push_back({static_cast<int>(r), batch.samples - 1, T(1), T(0)});
+    active_.push_back({static_cast<int>(r), batch.samples - 1, T(1)});
   ShadeActive(parameters, batch, lights, log_gain);
   std::vector<Wall> walls(active_.size());
   for (size_t i = 0; i < active_.size(); ++i) {
@@ -237,18 +248,14 @@ void RayLoss<T>::BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& 
   if (settings.albedo_weight > 0) {
     const Panel<T>& log_albedo = bounded ? log_albedo_ : surface_.color_output();
     const T strength = settings.albedo_weight * settings.per_ray / 3;
-    for (int c = 0; c < 3; ++c) {
-      terms->albedo += Pull(strength, settings.albedo_width, log_albedo, c, &surface_.color_delta);
-    }
+    terms->albedo += Pull(strength, settings.albedo_width, log_albedo, &surface_.color_delta);
   }
   for (size_t i = 0; bounded && i < active_.size(); ++i)
     for (int c = 0; c < 3; ++c) surface_.color_delta.At(c, i) *= log_albedo_slope_.At(c, i);
   if (field_->has_ambient()) {
     const T strength = settings.ambient_weight * settings.per_ray / 3;
-    for (int c = 0; c < 3; ++c) {
-      terms->ambient +=
-          Pull(strength, settings.albedo_width, surface_.ambient_output(), c, &surface_.ambient_delta);
-    }
+    terms->ambient +=
+        Pull(strength, settings.albedo_width, surface_.ambient_output(), &surface_.ambient_delta);
   }
   for (size_t r = 0; r < batch.rays.size(); ++r) {
     RayWeightsBackward(n, &signed_distance_[r * n], settings.sharpness, &transmittance_[r * n],
@@ -262,30 +269,40 @@ void RayLoss<T>::BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& 
   }
 }
 
-// Pulls a logarithm that the networks put out (of the albedo, of the ambient factor) towards its mean over
+// Pulls the logarithms that a network puts out (of the albedo, of the ambient factor; a channel each) towards its mean over
 // the batch. The mean is the batch's own and moves with it, so the pull is on the spread alone and never on
 // the level: a pull to a fixed mean would hold the whole reconstruction at the scale at which it starts. It
 // acts on the output alone: a weight that depended on it would move the surface to where the output is mean.
 template <class T>
-double RayLoss<T>::Pull(T strength, T width, const Panel<T>& output, int row, Panel<T>* delta) {
-  T weight = 0, mean = 0, mean_slope = 0;
-  for (size_t i = 0; i < active_.size(); ++i) {
+double RayLoss<T>::Pull(T strength, T width, const Panel<T>& output, Panel<T>* delta) {
+  const size_t count = active_.size();
+  T weight = 0, mean[3] = {}, mean_slope[3] = {};
+  for (size_t i = 0; i < count; ++i) {
     weight += active_[i].weight;
-    mean += active_[i].weight * output.At(row, i);
+    const T* out = output.Tile(static_cast<int>(i / kTile)) + i % kTile;
+    for (int c = 0; c < 3; ++c) mean[c] += active_[i].weight * out[c * kTile];
   }
   if (!(weight > 0)) return 0;
-  mean /= weight;
-  double loss = 0;
-  pull_.resize(active_.size());
-  for (size_t i = 0; i < active_.size(); ++i) {
-    pull_[i] = HuberLoss(output.At(row, i) - mean, width);
-    loss += strength * active_[i].weight * pull_[i].value;
-    mean_slope += active_[i].weight * pull_[i].slope / weight;
+  for (T& m : mean) m /= weight;
+  pull_.Resize(3, output.tiles());
+  double loss[3] = {};
+  for (size_t i = 0; i < count; ++i) {
+    const T* out = output.Tile(static_cast<int>(i / kTile)) + i % kTile;
+    T* slope = pull_.Tile(static_cast<int>(i / kTile)) + i % kTile;
+    for (int c = 0; c < 3; ++c) {
+      const Term<T> pull = HuberLoss(out[c * kTile] - mean[c], width);
+      slope[c * kTile] = pull.slope;
+      loss[c] += strength * active_[i].weight * pull.value;
+      mean_slope[c] += active_[i].weight * pull.slope / weight;
+    }
   }
-  for (size_t i = 0; i < active_.size(); ++i) {
-    delta->At(row, i) += strength * active_[i].weight * (pull_[i].slope - mean_slope);
+  for (size_t i = 0; i < count; ++i) {
+    const T* slope = pull_.Tile(static_cast<int>(i / kTile)) + i % kTile;
+    T* to = delta->Tile(static_cast<int>(i / kTile)) + i % kTile;
+    for (int c = 0; c < 3; ++c)
+      to[c * kTile] += strength * active_[i].weight * (slope[c * kTile] - mean_slope[c]);
   }
-  return loss;
+  return loss[0] + loss[1] + loss[2];
 }
 
 template <class T>
@@ -313,12 +330,12 @@ LossTerms RayLoss<T>::Evaluate(const T* parameters, const RayBatch<T>& batch,
     Vec3<T> slope;
     terms.eikonal += eikonal_share * EikonalLoss(gradient, &slope);
     Vec3<T> delta = eikonal_share * slope;
-    if (sample.weight > 0 && sample.length > T(kShortestGradient)) {
-      const Vec3<T> normal = gradient / sample.length;
+    if (sample.weight > 0 && length_[i] > T(kShortestGradient)) {
+      const Vec3<T> normal = gradient / length_[i];
       Vec3<T> by_normal(surface_.normal_delta.At(0, i), surface_.normal_delta.At(1, i),
                         surface_.normal_delta.At(2, i));
       by_normal += sample.weight * shading_[i].by_normal.transpose() * radiance_delta_[sample.ray];
-      delta += (by_normal - normal * normal.dot(by_normal)) / sample.length;
+      delta += (by_normal - normal * normal.dot(by_normal)) / length_[i];
     }
     for (int d = 0; d < 3; ++d) surface_.gradient_delta.At(d, i) = delta[d];
   }
@@ -331,13 +348,13 @@ LossTerms RayLoss<T>::Evaluate(const T* parameters, const RayBatch<T>& batch,
 template <class T>
 Vec3<T> RayLoss<T>::ByGradient(size_t i) const {
   const Active& sample = active_[i];
-  if (!(sample.weight > 0) || !(sample.length > T(kShortestGradient))) return Vec3<T>::Zero();
+  if (!(sample.weight > 0) || !(length_[i] > T(kShortestGradient))) return Vec3<T>::Zero();
   const Vec3<T> gradient(surface_.gradient.At(0, i), surface_.gradient.At(1, i), surface_.gradient.At(2, i));
-  const Vec3<T> normal = gradient / sample.length;
+  const Vec3<T> normal = gradient / length_[i];
   Vec3<T> by_normal(surface_.normal_delta.At(0, i), surface_.normal_delta.At(1, i),
                     surface_.normal_delta.At(2, i));
   by_normal += sample.weight * shading_[i].by_normal.transpose() * radiance_delta_[sample.ray];
-  return (by_normal - normal * normal.dot(by_normal)) / sample.length;
+  return (by_normal - normal * normal.dot(by_normal)) / length_[i];
 }
 
 template <class T>

@@ -102,7 +102,6 @@ class RayLoss {
   struct Active {
     int ray, sample;
     T weight;  // of the sample in its ray; 0 if only the eikonal term sees it
-    T length;  // of the SDF's gradient
   };
   void FindWeights(const T* parameters, const RayBatch<T>& batch, const LossSettings<T>& settings);
   void SelectActive(const RayBatch<T>& batch, const LossSettings<T>& settings);
@@ -110,7 +109,7 @@ class RayLoss {
                    const std::vector<T>& log_gain);
   double ComparePixels(const RayBatch<T>& batch, const std::vector<T>& log_gain,
                        const LossSettings<T>& settings, T* log_gain_gradient);
-  double Pull(T strength, T width, const Panel<T>& output, int row, Panel<T>* delta);
+  double Pull(T strength, T width, const Panel<T>& output, Panel<T>* delta);
   void BoundAlbedo(const Panel<T>& output);
   void ScaleByPower(T power);
   void PowerBackward(T* network_gradient) const;
@@ -130,9 +129,10 @@ class RayLoss {
   std::vector<Vec3<T>> ambient_;         // a ray: the part of its radiance that the rest of the wall sends
   std::vector<Vec3<T>> radiance_delta_;  // a ray
   std::vector<Active> active_;
+  std::vector<T> length_;                   // an active sample: of the SDF's gradient
   std::vector<Shading<T>> shading_;         // an active sample
   std::vector<ByCoat<T>> by_coat_;          // likewise, if the field has_coat
-  std::vector<Term<T>> pull_;               // on one of its outputs
+  Panel<T> pull_;                           // on three of its outputs
   Panel<T> log_albedo_, log_albedo_slope_;  // of the colour network's outputs, if the field bounds_albedo
   // Of the gradient by poses:
   Panel<T> positions_delta_;
