@@ -131,9 +131,9 @@ TEST(Grid, JacobianAndTableGradientsMatchFiniteDifferences) {
 // passes is Φ(s·f_last)/Φ(s·f_first).
 TEST(Volume, WeightsTelescope) {
   const double f[] = {3, 2.2, 1, 0.4, -0.1, -0.5, -2};
-  double transmittance[7], weight[7];
+  double occupancy[7], transmittance[7], weight[7];
   for (double sharpness : {0.3, 1.0, 4.4, 50.0}) {
-    RayWeights(7, f, sharpness, transmittance, weight);
+    RayWeights(7, f, sharpness, occupancy, transmittance, weight);
     double sum = 0;
     for (double w : weight) sum += w;
     const double passes = std::exp(LogSigmoid(sharpness * -2) - LogSigmoid(sharpness * 3));
@@ -146,19 +146,19 @@ TEST(Volume, WeightsTelescope) {
 TEST(Volume, GradientMatchesFiniteDifferences) {
   uint64_t state = 23;
   for (double sharpness : {0.3, 2.0, 10.0}) {
-    double f[9], by_weight[9], transmittance[9], weight[9], gradient[9];
+    double f[9], by_weight[9], occupancy[9], transmittance[9], weight[9], gradient[9];
     for (int i = 0; i < 9; ++i) {
       f[i] = 2 - 0.5 * i + 0.6 * Random(state);  // mostly falling, some sections rise
       by_weight[i] = Random(state);
     }
     auto loss = [&] {
-      RayWeights(9, f, sharpness, transmittance, weight);
+      RayWeights(9, f, sharpness, occupancy, transmittance, weight);
       double sum = 0;
       for (int i = 0; i < 9; ++i) sum += weight[i] * by_weight[i];
       return sum;
     };
     loss();
-    RayWeightsBackward(9, f, sharpness, transmittance, by_weight, gradient);
+    RayWeightsBackward(9, f, sharpness, occupancy, transmittance, by_weight, gradient);
     for (int i = 0; i < 9; ++i) EXPECT_NEAR(gradient[i], Difference(loss, &f[i]), 1e-8);
   }
 }

@@ -39,15 +39,15 @@ struct Ray {
 // Weights and their gradient in T.
 template <class T>
 struct Weighted {
-  T transmittance[Ray::kSamples], weight[Ray::kSamples], gradient[Ray::kSamples];
+  T occupancy[Ray::kSamples], transmittance[Ray::kSamples], weight[Ray::kSamples], gradient[Ray::kSamples];
 
   explicit Weighted(const Ray& ray) {
     T distance[Ray::kSamples], delta[Ray::kSamples];
     std::copy(ray.distance, ray.distance + Ray::kSamples, distance);
     std::copy(ray.delta, ray.delta + Ray::kSamples, delta);
     const T sharpness = ray.sharpness;
-    RayWeights<T>(Ray::kSamples, distance, sharpness, transmittance, weight);
-    RayWeightsBackward<T>(Ray::kSamples, distance, sharpness, transmittance, delta, gradient);
+    RayWeights<T>(Ray::kSamples, distance, sharpness, occupancy, transmittance, weight);
+    RayWeightsBackward<T>(Ray::kSamples, distance, sharpness, occupancy, transmittance, delta, gradient);
   }
 };
 
@@ -102,14 +102,14 @@ TEST(HardCasesTraining, OpacityWithBothSigmoidsSaturated) {
       for (const double change : {1e-3, 0.5, 3.0, 50.0}) {
         const double wall[2] = {-depth_mm, -depth_mm - change / s},
                      lumen[2] = {depth_mm, depth_mm - change / s}, across[2] = {depth_mm, -depth_mm};
-        double passes[2], weight[2];
-        RayWeights<double>(2, wall, s, passes, weight);
+        double occupied[2], passes[2], weight[2];
+        RayWeights<double>(2, wall, s, occupied, passes, weight);
         // s f has the rounding of a number of that size.
         EXPECT_NEAR(passes[1], std::exp(-change), 4 * 0x1p-53 * (s * depth_mm) + 1e-15)
             << s << " " << depth_mm;
-        RayWeights<double>(2, lumen, s, passes, weight);
+        RayWeights<double>(2, lumen, s, occupied, passes, weight);
         EXPECT_NEAR(passes[1], 1, 1e-40 + std::exp(-s * (depth_mm - change / s)));
-        RayWeights<double>(2, across, s, passes, weight);
+        RayWeights<double>(2, across, s, occupied, passes, weight);
         EXPECT_LT(passes[1], 1e-40);
         EXPECT_NEAR(weight[0], 0.5, 1e-15);
       }
@@ -117,10 +117,10 @@ TEST(HardCasesTraining, OpacityWithBothSigmoidsSaturated) {
   }
   // And its gradient there, which no epsilon dampens: ∂(1 − e^(s(f₁ − f₀)))/∂f₀ = s e^(s(f₁ − f₀)).
   const double s = 1e3, wall[2] = {-500, -500.001};
-  double passes[2], weight[2], gradient[2];
-  RayWeights<double>(2, wall, s, passes, weight);
+  double occupied[2], passes[2], weight[2], gradient[2];
+  RayWeights<double>(2, wall, s, occupied, passes, weight);
   const double first_only[2] = {1, 0};
-  RayWeightsBackward<double>(2, wall, s, passes, first_only, gradient);
+  RayWeightsBackward<double>(2, wall, s, occupied, passes, first_only, gradient);
   EXPECT_NEAR(gradient[0], s * std::exp(-1.0) / 2, 1e-6 * s);
   EXPECT_NEAR(gradient[1], -s * std::exp(-1.0) / 2, 1e-6 * s);
 }

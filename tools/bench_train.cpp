@@ -266,9 +266,10 @@ BENCHMARK(FieldBackward)->Arg(0)->Arg(1);
 // 32 rays of 17 samples that fall through the surface.
 struct Rays {
   static constexpr int kRays = 32, kPerRay = 17;
-  std::vector<float> distance, transmittance, weight, weight_delta, distance_delta;
+  std::vector<float> distance, occupancy, transmittance, weight, weight_delta, distance_delta;
   Rays()
       : distance(kRays * kPerRay),
+        occupancy(distance.size()),
         transmittance(distance.size()),
         weight(distance.size()),
         weight_delta(distance.size(), 0.3f),
@@ -283,7 +284,8 @@ void OpacityForward(State& state) {
   for (auto _ : state) {
     for (int r = 0; r < Rays::kRays; ++r) {
       const int at = r * Rays::kPerRay;
-      RayWeights(Rays::kPerRay, &rays.distance[at], 2.0f, &rays.transmittance[at], &rays.weight[at]);
+      RayWeights(Rays::kPerRay, &rays.distance[at], 2.0f, &rays.occupancy[at], &rays.transmittance[at],
+                 &rays.weight[at]);
     }
     benchmark::ClobberMemory();
   }
@@ -295,12 +297,13 @@ void OpacityBackward(State& state) {
   Rays rays;
   for (int r = 0; r < Rays::kRays; ++r) {
     const int at = r * Rays::kPerRay;
-    RayWeights(Rays::kPerRay, &rays.distance[at], 2.0f, &rays.transmittance[at], &rays.weight[at]);
+    RayWeights(Rays::kPerRay, &rays.distance[at], 2.0f, &rays.occupancy[at], &rays.transmittance[at],
+                 &rays.weight[at]);
   }
   for (auto _ : state) {
     for (int r = 0; r < Rays::kRays; ++r) {
       const int at = r * Rays::kPerRay;
-      RayWeightsBackward(Rays::kPerRay, &rays.distance[at], 2.0f, &rays.transmittance[at],
+      RayWeightsBackward(Rays::kPerRay, &rays.distance[at], 2.0f, &rays.occupancy[at], &rays.transmittance[at],
                          &rays.weight_delta[at], &rays.distance_delta[at]);
     }
     benchmark::ClobberMemory();

@@ -32,6 +32,13 @@ nlohmann::json Estimate(const Sequence& sequence, const TrainOptions& options, u
              static_cast<double>(estimate.state_bytes) / kMegabyte, estimate.frames);
   fmt::print("seconds        {:.4g} an iteration (median of {})\n", estimate.seconds_per_iteration,
              estimate.measured_iterations);
+  fmt::print("goes on       ");
+  nlohmann::json phases;
+  for (size_t i = 0; i < kPhaseNames.size(); ++i) {
+    fmt::print(" {} {:.3g}", kPhaseNames[i], 1e3 * estimate.phase_seconds[i]);
+    phases[kPhaseNames[i]] = estimate.phase_seconds[i];
+  }
+  fmt::print(" ms, all threads\n");
   fmt::print("the whole run  {} iterations, {}\n", estimate.iterations, Duration(estimate.seconds));
   return {{"parameters", estimate.parameters},
           {"network_parameters", estimate.network_parameters},
@@ -41,6 +48,7 @@ nlohmann::json Estimate(const Sequence& sequence, const TrainOptions& options, u
           {"resident_bytes", estimate.resident_bytes},
           {"measured_iterations", estimate.measured_iterations},
           {"seconds_per_iteration", estimate.seconds_per_iteration},
+          {"phase_seconds", phases},
           {"iterations", estimate.iterations},
           {"seconds", estimate.seconds}};
 }

@@ -51,7 +51,9 @@ class Panel {
   const T* Tile(int tile) const { return data_.data() + size_t(tile) * rows_ * kTile; }
   T* Row(int tile, int row) { return Tile(tile) + size_t(row) * kTile; }
   const T* Row(int tile, int row) const { return Tile(tile) + size_t(row) * kTile; }
-  // Of one sample, counted through all tiles.
+  // A sample's column, samples counted through all tiles: its number in row r is [r * kTile].
+  T* Column(size_t sample) { return Tile(static_cast<int>(sample / kTile)) + sample % kTile; }
+  const T* Column(size_t sample) const { return Tile(static_cast<int>(sample / kTile)) + sample % kTile; }
   T& At(int row, int sample) { return Row(sample / kTile, row)[sample % kTile]; }
   T At(int row, int sample) const { return Row(sample / kTile, row)[sample % kTile]; }
 

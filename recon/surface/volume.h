@@ -24,14 +24,14 @@ T Sigmoid(T x) {
 // Weights of the n samples of a ray: a section's opacity times the transmittance before it, half to each of
 // its ends (the trapezoidal rule). What passes the last sample is the last one's: the wall is opaque, and a
 // ray whose weights fell short of 1 would be dark in a way that only a nearer wall can mend, a force on every
-// surface and always the same way. transmittance: n numbers, from 1 at the first sample to what passes the
-// last.
+// surface and always the same way. occupancy: n numbers Φ(−s·f), 1 deep in the wall; transmittance: n
+// numbers, from 1 at the first sample to what passes the last.
 template <class T>
-void RayWeights(int n, const T* signed_distance, T sharpness, T* transmittance, T* weight);
+void RayWeights(int n, const T* signed_distance, T sharpness, T* occupancy, T* transmittance, T* weight);
 
 // The gradient: distance_delta[i] = ∂loss/∂signed_distance[i], given weight_delta[i] = ∂loss/∂weight[i].
 template <class T>
-void RayWeightsBackward(int n, const T* signed_distance, T sharpness, const T* transmittance,
-                        const T* weight_delta, T* distance_delta);
+void RayWeightsBackward(int n, const T* signed_distance, T sharpness, const T* occupancy,
+                        const T* transmittance, const T* weight_delta, T* distance_delta);
 
 }  // namespace lumen

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <fstream>
 #include <vector>
 
@@ -37,15 +38,21 @@ TrainEstimate EstimateTraining(const Sequence& sequence, const TrainOptions& opt
   result.samples_per_iteration = int64_t(options.sampling.rays) * options.sampling.PerRay();
   result.state_bytes = 4 * result.parameters * static_cast<int64_t>(sizeof(float));
 
-  trainer.Step(0);  // fills caches and workspaces
+  // A step's cost follows the schedule: where it is sharp, fewer samples of a ray count. These are spread over
+  // it evenly, however many there will be (multiples of the golden ratio, Weyl 1916).
+  const auto progress_at = [](size_t i) { return std::fmod(0.5 + 0.6180339887498949 * double(i), 1.0); };
+  trainer.Step(progress_at(0));  // fills caches and workspaces
+  trainer.MeasurePhases();
   std::vector<double> seconds;
   const double start = Now();
   while (seconds.size() < 2 ||
          (Now() - start < estimate.seconds && static_cast<int64_t>(seconds.size()) < estimate.iterations)) {
     const double before = Now();
-    trainer.Step(0);
+    trainer.Step(progress_at(seconds.size()));
     seconds.push_back(Now() - before);
   }
+  result.phase_seconds = trainer.phase_seconds();
+  for (double& phase : result.phase_seconds) phase /= static_cast<double>(seconds.size());
   result.resident_bytes = ResidentBytes();
   result.measured_iterations = static_cast<int64_t>(seconds.size());
   std::ranges::sort(seconds);

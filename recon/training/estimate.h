@@ -1,10 +1,11 @@
-// What a training run would cost on this machine, measured over its first iterations.
+// What a training run would cost on this machine, measured over some iterations, and on what it goes.
 #pragma once
 
 #include <cstdint>
 
 #include "common/sequence.h"
 #include "recon/training/options.h"
+#include "recon/training/phase_clock.h"
 
 namespace lumen {
 
@@ -17,12 +18,13 @@ struct TrainEstimate {
   int64_t resident_bytes = 0;         // of the whole process after the measured iterations, frames included
   int64_t measured_iterations = 0;
   double seconds_per_iteration = 0;  // their median, wall time
+  PhaseSeconds phase_seconds = {};   // an iteration's, their mean, threads added up
   int64_t iterations = 0;            // of the whole run
   double seconds = 0;
 };
 
 struct EstimateOptions {
-  double seconds = 5;        // of measuring, about; at least two iterations after one that doesn't count
+  double seconds = 5;        // of measuring, about; at least two iterations after some that don't count
   int64_t iterations = 100;  // no more than so many
   uint64_t seed = 0;
 };

@@ -68,8 +68,8 @@ T EikonalLoss(const Vec3<T>& gradient, Vec3<T>* slope) {
 template <class T>
 Term<T> HuberLoss(T x, T width) {
   const T size = std::abs(x);
-  if (size <= width) return {x * x / (2 * width), x / width};
-  return {size - width / 2, x > 0 ? T(1) : T(-1)};
+  const bool within = size <= width;
+  return {within ? x * x / (2 * width) : size - width / 2, within ? x / width : x > 0 ? T(1) : T(-1)};
 }
 
 }  // namespace lumen

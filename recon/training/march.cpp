@@ -74,6 +74,7 @@ void Marcher::Place(const float* parameters, const TrainOptions::Sampling& optio
   const int n = options.surface + options.spread;
   batch->samples = n;
   batch->distance.resize(batch->rays.size() * n);
+  placed_.resize(n);
   for (size_t r = 0; r < batch->rays.size(); ++r) {
     const Crossing& c = crossings_[r];
     const float meets = ZeroBetween(c.inside, c.outside, c.inside_value, c.outside_value);
@@ -85,14 +86,16 @@ void Marcher::Place(const float* parameters, const TrainOptions::Sampling& optio
     for (int k = 0; k < options.surface; ++k) {
       const float jitter = UniformFloat(RandomBits(key, r, 1 + k));
       const float t = meets + spacing * (k + jitter - 0.5f * options.surface);
-      distance[k] = std::clamp(t, kNearest_mm, far_[r]);
+      placed_[k] = std::clamp(t, kNearest_mm, far_[r]);
     }
     for (int k = 0; k < options.spread; ++k) {
       const float jitter = UniformFloat(RandomBits(key, r, 1 + options.surface + k));
-      distance[options.surface + k] = kNearest_mm + (last - kNearest_mm) * (k + jitter) / options.spread;
+      placed_[options.surface + k] = kNearest_mm + (last - kNearest_mm) * (k + jitter) / options.spread;
     }
-    const float eikonal = distance[options.surface + RandomBits(key, r, 1 + n) % options.spread];
-    std::sort(distance, distance + n);
+    const float eikonal = placed_[options.surface + RandomBits(key, r, 1 + n) % options.spread];
+    // Each kind is in order as it is made.
+    std::merge(placed_.begin(), placed_.begin() + options.surface, placed_.begin() + options.surface,
+               placed_.end(), distance);
     batch->rays[r].eikonal_sample =
         static_cast<int>(std::lower_bound(distance, distance + n, eikonal) - distance);
   }

@@ -25,7 +25,7 @@ class Marcher : public RaySampler {
 
   const Field<float>* field_;
   Field<float>::ValuePass pass_;
-  std::vector<float> look_, far_;
+  std::vector<float> look_, far_, placed_;
   std::vector<Crossing> crossings_;
 };
 

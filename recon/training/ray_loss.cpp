@@ -10,6 +10,13 @@ namespace {
 // sample may outweigh another.
 constexpr double kShortestGradient = 0.05;
 
+// A sample's first three numbers.
+template <class T>
+Vec3<T> Vector(const Panel<T>& panel, size_t sample) {
+  const T* column = panel.Column(sample);
+  return {column[0], column[kTile], column[2 * kTile]};
+}
+
 }  // namespace
 
 LossTerms& LossTerms::operator+=(const LossTerms& other) {
@@ -31,16 +38,18 @@ void RayLoss<T>::FindWeights(const T* parameters, const RayBatch<T>& batch, cons
   for (int i = 0; i < TilesFor(count) * kTile; ++i) {
     const int k = std::min(i, count - 1);  // the last tile is filled up with copies of the last sample
     const auto& ray = batch.rays[k / n];
-    for (int d = 0; d < 3; ++d)
-      value_.positions.At(d, i) = ray.origin[d] + batch.distance[k] * ray.direction[d];
+    T* position = value_.positions.Column(i);
+    for (int d = 0; d < 3; ++d) position[d * kTile] = ray.origin[d] + batch.distance[k] * ray.direction[d];
   }
   field_->Value(parameters, &value_);
   signed_distance_.resize(count);
+  occupancy_.resize(count);
   transmittance_.resize(count);
   weight_.resize(count);
   for (int i = 0; i < count; ++i) signed_distance_[i] = value_.value.At(0, i);
   for (size_t r = 0; r < batch.rays.size(); ++r) {
-    RayWeights(n, &signed_distance_[r * n], settings.sharpness, &transmittance_[r * n], &weight_[r * n]);
+    RayWeights(n, &signed_distance_[r * n], settings.sharpness, &occupancy_[r * n], &transmittance_[r * n],
+               &weight_[r * n]);
   }
 }
 
@@ -52,12 +61,8 @@ void RayLoss<T>::SelectActive(const RayBatch<T>& batch, const LossSettings<T>& s
     for (int k = 0; k < n; ++k) {
       const size_t i = r * n + k;
       // A sample's own weight, and the light that a change of its distance could still take away.
-      bool seen = weight_[i] >= settings.weight_threshold;
-      // The latter is at most its transmittance, which spares most samples the exponential.
-      if (!seen && transmittance_[i] >= settings.weight_threshold) {
-        const T influence = transmittance_[i] * Sigmoid(-settings.sharpness * signed_distance_[i]);
-        seen = influence >= settings.weight_threshold;
-      }
+      const T influence = transmittance_[i] * occupancy_[i];
+      const bool seen = weight_[i] >= settings.weight_threshold || influence >= settings.weight_threshold;
       if (!seen && k != batch.rays[r].eikonal_sample) continue;
       active_.push_back({static_cast<int>(r), k, seen ? weight_[i] : T(0)});
     }
@@ -76,8 +81,8 @@ void RayLoss<T>::ShadeActive(const T* parameters, const RayBatch<T>& batch,
     const Active& sample = active_[std::min(i, count - 1)];
     const auto& ray = batch.rays[sample.ray];
     const T t = batch.distance[size_t(sample.ray) * batch.samples + sample.sample];
-    T* position = surface_.positions.Tile(i / kTile) + i % kTile;
-    T* direction = surface_.directions.Tile(i / kTile) + i % kTile;
+    T* position = surface_.positions.Column(i);
+    T* direction = surface_.directions.Column(i);
     for (int d = 0; d < 3; ++d) {
       position[d * kTile] = ray.origin[d] + t * ray.direction[d];
       direction[d * kTile] = ray.direction[d];
@@ -96,6 +101,7 @@ void RayLoss<T>::ShadeActive(const T* parameters, const RayBatch<T>& batch,
       for (int d = 0; d < 3; ++d) normal[d * kTile + s] = gradient[d * kTile + s] / divisor;
     }
   }
+  Lap(clock_, Phase::kSurface);
   field_->Color(parameters, &surface_);
   if (field_->bounds_albedo()) BoundAlbedo(surface_.color_output());
   const Panel<T>& output = field_->bounds_albedo() ? log_albedo_ : surface_.color_output();
@@ -106,25 +112,28 @@ void RayLoss<T>::ShadeActive(const T* parameters, const RayBatch<T>& batch,
     coat = LearntCoat(field_->options().coat, parameters + field_->coat_begin());
     by_coat_.resize(count);
   }
+  int looked_along = -1;
+  Vec3<T> surroundings;  // on that ray, which is the same at all its samples
   for (int i = 0; i < count; ++i) {
     const Active& sample = active_[i];
     if (!(sample.weight > 0)) continue;
-    const Vec3<T> point(surface_.positions.At(0, i), surface_.positions.At(1, i),
-                        surface_.positions.At(2, i));
-    const Vec3<T> normal(surface_.normal.At(0, i), surface_.normal.At(1, i), surface_.normal.At(2, i));
+    const Vec3<T> point = Vector(surface_.positions, i), normal = Vector(surface_.normal, i);
     const int frame = batch.rays[sample.ray].frame;
     Vec3<T> ambient = Vec3<T>::Zero();
     if (lights[frame].surroundings) {
       const auto& light = lights[frame];
-      ambient = light.surroundings->At(light.camera_from_field * batch.rays[sample.ray].direction);
-      for (int c = 0; c < 3; ++c) ambient[c] *= std::exp(surface_.ambient_output().At(c, i));
+      if (sample.ray != looked_along)
+        surroundings = light.surroundings->At(light.camera_from_field * batch.rays[sample.ray].direction);
+      looked_along = sample.ray;
+      const T* log_factor = surface_.ambient_output().Column(i);
+      for (int c = 0; c < 3; ++c) ambient[c] = surroundings[c] * std::exp(log_factor[c * kTile]);
     } else if (field_->has_ambient()) {
       // What the pixels show of the other places holds the frame's gain already.
       ambient = T(kPi) * lights[frame].mean_radiance;
-      for (int c = 0; c < 3; ++c)
-        ambient[c] *= std::exp(surface_.ambient_output().At(c, i) - log_gain[frame]);
+      const T* log_factor = surface_.ambient_output().Column(i);
+      for (int c = 0; c < 3; ++c) ambient[c] *= std::exp(log_factor[c * kTile] - log_gain[frame]);
     }
-    const Vec3<T> color(output.At(0, i), output.At(1, i), output.At(2, i));
+    const Vec3<T> color = Vector(output, i);
     shading_[i] = has_coat
                       ? ShadeCoated(coat, color, normal, lights[frame], point, ambient, &by_coat_[i])
                       : Shade(field_->options().reflectance, color, normal, lights[frame], point, ambient);
@@ -239,9 +248,10 @@ void RayLoss<T>::BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& 
     if (!(sample.weight > 0)) continue;
     const Vec3<T>& delta = radiance_delta_[sample.ray];
     weight_delta_[size_t(sample.ray) * n + sample.sample] = delta.dot(shading_[i].radiance);
+    T *color = surface_.color_delta.Column(i), *ambient = surface_.ambient_delta.Column(i);
     for (int c = 0; c < 3; ++c) {
-      surface_.color_delta.At(c, i) = delta[c] * sample.weight * shading_[i].by_output[c];
-      surface_.ambient_delta.At(c, i) = delta[c] * sample.weight * shading_[i].ambient[c];
+      color[c * kTile] = delta[c] * sample.weight * shading_[i].by_output[c];
+      ambient[c * kTile] = delta[c] * sample.weight * shading_[i].ambient[c];
     }
   }
   const bool bounded = field_->bounds_albedo();
@@ -258,14 +268,14 @@ void RayLoss<T>::BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& 
         Pull(strength, settings.albedo_width, surface_.ambient_output(), &surface_.ambient_delta);
   }
   for (size_t r = 0; r < batch.rays.size(); ++r) {
-    RayWeightsBackward(n, &signed_distance_[r * n], settings.sharpness, &transmittance_[r * n],
-                       &weight_delta_[r * n], &distance_delta_[r * n]);
+    RayWeightsBackward(n, &signed_distance_[r * n], settings.sharpness, &occupancy_[r * n],
+                       &transmittance_[r * n], &weight_delta_[r * n], &distance_delta_[r * n]);
   }
   // The weights depend on s · f only.
   for (size_t i = 0; i < distance_delta_.size(); ++i)
     terms->by_log_sharpness += double(signed_distance_[i]) * double(distance_delta_[i]);
   for (size_t i = 0; i < active_.size(); ++i) {
-    surface_.value_delta.At(0, i) = distance_delta_[size_t(active_[i].ray) * n + active_[i].sample];
+    *surface_.value_delta.Column(i) = distance_delta_[size_t(active_[i].ray) * n + active_[i].sample];
   }
 }
 
@@ -276,31 +286,45 @@ void RayLoss<T>::BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& 
 template <class T>
 double RayLoss<T>::Pull(T strength, T width, const Panel<T>& output, Panel<T>* delta) {
   const size_t count = active_.size();
+  sample_weight_.Resize(1, output.tiles());
+  sample_weight_.SetZero();
+  for (size_t i = 0; i < count; ++i) *sample_weight_.Column(i) = active_[i].weight;
   T weight = 0, mean[3] = {}, mean_slope[3] = {};
   for (size_t i = 0; i < count; ++i) {
     weight += active_[i].weight;
-    const T* out = output.Tile(static_cast<int>(i / kTile)) + i % kTile;
+    const T* out = output.Column(i);
     for (int c = 0; c < 3; ++c) mean[c] += active_[i].weight * out[c * kTile];
   }
   if (!(weight > 0)) return 0;
   for (T& m : mean) m /= weight;
+  // All that isn't a sum is computed a row at a time; the sums are in the samples' order.
   pull_.Resize(3, output.tiles());
-  double loss[3] = {};
-  for (size_t i = 0; i < count; ++i) {
-    const T* out = output.Tile(static_cast<int>(i / kTile)) + i % kTile;
-    T* slope = pull_.Tile(static_cast<int>(i / kTile)) + i % kTile;
-    for (int c = 0; c < 3; ++c) {
-      const Term<T> pull = HuberLoss(out[c * kTile] - mean[c], width);
-      slope[c * kTile] = pull.slope;
-      loss[c] += strength * active_[i].weight * pull.value;
-      mean_slope[c] += active_[i].weight * pull.slope / weight;
+  pull_slope_.Resize(3, output.tiles());
+  pull_share_.Resize(3, output.tiles());
+  for (int row = 0; row < 3 * output.tiles(); ++row) {
+    const int tile = row / 3, c = row % 3;
+    const T *out = output.Row(tile, c), *w = sample_weight_.Tile(tile);
+    T *loss = pull_.Row(tile, c), *slope = pull_slope_.Row(tile, c), *share = pull_share_.Row(tile, c);
+    for (int s = 0; s < kTile; ++s) {
+      const Term<T> pull = HuberLoss(out[s] - mean[c], width);
+      slope[s] = pull.slope;
+      loss[s] = strength * w[s] * pull.value;
+      share[s] = w[s] * pull.slope / weight;
     }
   }
+  double loss[3] = {};
   for (size_t i = 0; i < count; ++i) {
-    const T* slope = pull_.Tile(static_cast<int>(i / kTile)) + i % kTile;
-    T* to = delta->Tile(static_cast<int>(i / kTile)) + i % kTile;
-    for (int c = 0; c < 3; ++c)
-      to[c * kTile] += strength * active_[i].weight * (slope[c * kTile] - mean_slope[c]);
+    const T *pull = pull_.Column(i), *share = pull_share_.Column(i);
+    for (int c = 0; c < 3; ++c) {
+      loss[c] += pull[c * kTile];
+      mean_slope[c] += share[c * kTile];
+    }
+  }
+  for (int row = 0; row < 3 * output.tiles(); ++row) {
+    const int tile = row / 3, c = row % 3;
+    const T *slope = pull_slope_.Row(tile, c), *w = sample_weight_.Tile(tile);
+    T* to = delta->Row(tile, c);
+    for (int s = 0; s < kTile; ++s) to[s] += strength * w[s] * (slope[s] - mean_slope[c]);
   }
   return loss[0] + loss[1] + loss[2];
 }
@@ -314,9 +338,12 @@ LossTerms RayLoss<T>::Evaluate(const T* parameters, const RayBatch<T>& batch,
   FindWeights(parameters, batch, settings);
   SelectActive(batch, settings);
   terms.active_samples = static_cast<int64_t>(active_.size());
+  Lap(clock_, Phase::kDistances);
   ShadeActive(parameters, batch, lights, log_gain);
+  Lap(clock_, Phase::kColors);
   terms.photometric = ComparePixels(batch, log_gain, settings, log_gain_gradient);
   BackToSamples(batch, settings, &terms);
+  Lap(clock_, Phase::kPixels);
   field_->ColorBackward(parameters, &surface_, network_gradient);
   if (field_->has_coat()) CoatBackward(parameters, network_gradient);
   if (field_->learns_power()) PowerBackward(network_gradient);
@@ -325,21 +352,21 @@ LossTerms RayLoss<T>::Evaluate(const T* parameters, const RayBatch<T>& batch,
   const T eikonal_share = settings.eikonal_weight * settings.per_ray / T(batch.samples);
   for (size_t i = 0; i < active_.size(); ++i) {
     const Active& sample = active_[i];
-    const Vec3<T> gradient(surface_.gradient.At(0, i), surface_.gradient.At(1, i),
-                           surface_.gradient.At(2, i));
+    const Vec3<T> gradient = Vector(surface_.gradient, i);
     Vec3<T> slope;
     terms.eikonal += eikonal_share * EikonalLoss(gradient, &slope);
     Vec3<T> delta = eikonal_share * slope;
     if (sample.weight > 0 && length_[i] > T(kShortestGradient)) {
       const Vec3<T> normal = gradient / length_[i];
-      Vec3<T> by_normal(surface_.normal_delta.At(0, i), surface_.normal_delta.At(1, i),
-                        surface_.normal_delta.At(2, i));
+      Vec3<T> by_normal = Vector(surface_.normal_delta, i);
       by_normal += sample.weight * shading_[i].by_normal.transpose() * radiance_delta_[sample.ray];
       delta += (by_normal - normal * normal.dot(by_normal)) / length_[i];
     }
-    for (int d = 0; d < 3; ++d) surface_.gradient_delta.At(d, i) = delta[d];
+    T* gradient_delta = surface_.gradient_delta.Column(i);
+    for (int d = 0; d < 3; ++d) gradient_delta[d * kTile] = delta[d];
   }
   field_->SurfaceBackward(parameters, &surface_, network_gradient);
+  Lap(clock_, Phase::kBackward);
   return terms;
 }
 
@@ -349,10 +376,9 @@ template <class T>
 Vec3<T> RayLoss<T>::ByGradient(size_t i) const {
   const Active& sample = active_[i];
   if (!(sample.weight > 0) || !(length_[i] > T(kShortestGradient))) return Vec3<T>::Zero();
-  const Vec3<T> gradient(surface_.gradient.At(0, i), surface_.gradient.At(1, i), surface_.gradient.At(2, i));
+  const Vec3<T> gradient = Vector(surface_.gradient, i);
   const Vec3<T> normal = gradient / length_[i];
-  Vec3<T> by_normal(surface_.normal_delta.At(0, i), surface_.normal_delta.At(1, i),
-                    surface_.normal_delta.At(2, i));
+  Vec3<T> by_normal = Vector(surface_.normal_delta, i);
   by_normal += sample.weight * shading_[i].by_normal.transpose() * radiance_delta_[sample.ray];
   return (by_normal - normal * normal.dot(by_normal)) / length_[i];
 }

@@ -11,6 +11,7 @@
 #include "recon/surface/mucus_coat.h"
 #include "recon/surface/shading.h"
 #include "recon/training/loss.h"
+#include "recon/training/phase_clock.h"
 
 namespace lumen {
 
@@ -77,6 +78,9 @@ class RayLoss {
  public:
   explicit RayLoss(const Field<T>* field) : field_(field) {}
 
+  // Evaluate's phases are measured by it from then on; null: they aren't.
+  void set_clock(PhaseClock* clock) { clock_ = clock; }
+
   // Loss of a batch. Adds the gradient by the networks' parameters to network_gradient and by each frame's
   // log gain to log_gain_gradient; the grid's part waits for GridBackward. pose_gradient: null, or
   // kPoseNumbers a frame, to which is added the gradient by a motion of the frame's camera with its rays,
@@ -123,16 +127,19 @@ class RayLoss {
   void BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& settings, LossTerms* terms);
 
   const Field<T>* field_;
+  PhaseClock* clock_ = nullptr;
   typename Field<T>::ValuePass value_;
   typename Field<T>::SurfacePass surface_;
-  std::vector<T> signed_distance_, transmittance_, weight_, weight_delta_, distance_delta_;  // rays × samples
+  // Rays × samples.
+  std::vector<T> signed_distance_, occupancy_, transmittance_, weight_, weight_delta_, distance_delta_;
   std::vector<Vec3<T>> ambient_;         // a ray: the part of its radiance that the rest of the wall sends
   std::vector<Vec3<T>> radiance_delta_;  // a ray
   std::vector<Active> active_;
   std::vector<T> length_;                   // an active sample: of the SDF's gradient
   std::vector<Shading<T>> shading_;         // an active sample
   std::vector<ByCoat<T>> by_coat_;          // likewise, if the field has_coat
-  Panel<T> pull_;                           // on three of its outputs
+  Panel<T> sample_weight_;                  // its weight; 0 beyond the last
+  Panel<T> pull_, pull_slope_, pull_share_;  // on three of its outputs
   Panel<T> log_albedo_, log_albedo_slope_;  // of the colour network's outputs, if the field bounds_albedo
   // Of the gradient by poses:
   Panel<T> positions_delta_;

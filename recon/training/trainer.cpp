@@ -88,6 +88,7 @@ Trainer::Trainer(const TrainingFrames& frames, const TrainOptions& options, uint
     if (options.poses.refine) chunk.pose_gradient.assign(size_t(frames.size()) * kPoseNumbers, 0.0f);
     chunks_.push_back(std::move(chunk));
   }
+  update_clocks_.resize(field_->grid().levels() + 1);
   free_space_ = std::make_unique<FreeSpace<float>>(field_.get());
   norm_ = field_->Normalisation();
   const size_t count = field_->parameter_count() + norm_.lengths();
@@ -214,6 +215,21 @@ double Trainer::RateAt(double progress) const {
   return LogInterpolate(start, end, at);
 }
 
+void Trainer::MeasurePhases() {
+  for (Chunk& chunk : chunks_) chunk.clock = std::make_unique<PhaseClock>();
+  for (auto& clock : update_clocks_) clock = std::make_unique<PhaseClock>();
+}
+
+PhaseSeconds Trainer::phase_seconds() const {
+  PhaseSeconds sum = {};
+  const auto add = [&](const std::unique_ptr<PhaseClock>& clock) {
+    for (size_t i = 0; clock && i < sum.size(); ++i) sum[i] += clock->seconds()[i];
+  };
+  for (const Chunk& chunk : chunks_) add(chunk.clock);
+  for (const auto& clock : update_clocks_) add(clock);
+  return sum;
+}
+
 std::unique_ptr<Trainer::Workspace> Trainer::TakeWorkspace(Chunk* chunk) {
   std::unique_ptr<Workspace> workspace = std::move(chunk->workspace);
   if (!workspace) {
@@ -240,18 +256,26 @@ void Trainer::RunChunk(int index, const float* weights, const LossSettings<float
   Chunk& chunk = chunks_[index];
   std::unique_ptr<Workspace> workspace = TakeWorkspace(&chunk);
   RayBatch<float>& batch = workspace->batch;
+  PhaseClock* clock = chunk.clock.get();
+  workspace->loss.set_clock(clock);
+  if (clock) clock->Start();
   const uint64_t step_key = RandomBits(seed_, 0x7261797300ull, static_cast<uint64_t>(state_.iteration));
   const int piece = has_grid() ? chunk.rays : kPieceRays;
   chunk.terms = {};
   for (int begin = 0; begin < chunk.rays; begin += piece) {
     batch.rays.resize(std::min(piece, chunk.rays - begin));
+    const auto draw = [&](size_t r) {
+      return RandomBits(step_key, static_cast<uint64_t>(index) * kChunkRays + begin + r);
+    };
+    for (size_t r = 0; r < batch.rays.size(); ++r) frames_.Prefetch(draw(r));
     for (size_t r = 0; r < batch.rays.size(); ++r) {
-      frames_.Draw(RandomBits(step_key, static_cast<uint64_t>(index) * kChunkRays + begin + r), origin_,
-                   &batch.rays[r]);
+      frames_.Draw(draw(r), origin_, &batch.rays[r]);
       if (refines_poses()) Move(state_.poses, &batch.rays[r]);
     }
+    Lap(clock, Phase::kRays);
     workspace->sampler->Place(weights, options_.sampling, settings.sharpness,
                               RandomBits(step_key, static_cast<uint64_t>(index), 1 + begin), &batch);
+    Lap(clock, Phase::kPlaces);
     chunk.terms += workspace->loss.Evaluate(
         weights, batch, lights_, state_.log_gain, settings, chunk.network_gradient.data(),
         chunk.log_gain_gradient.data(), chunk.pose_gradient.empty() ? nullptr : chunk.pose_gradient.data());
@@ -410,14 +434,21 @@ StepReport Trainer::Step(double progress) {
     table_step.epsilon = static_cast<float>(schedule.table_epsilon);
   const int levels = field_->grid().levels();
   ParallelFor(0, levels + 1, [&](int64_t task) {
-    if (task == levels) return UpdateNetworks(step);
+    PhaseClock* clock = update_clocks_[task].get();
+    if (clock) clock->Start();
+    if (task == levels) {
+      UpdateNetworks(step);
+      return Lap(clock, Phase::kAdam);
+    }
     // From the finest level on, which has the most to do.
     const int level = levels - 1 - static_cast<int>(task);
     for (Chunk& chunk : chunks_) chunk.workspace->loss.GridBackward(level, gradient_.data());
     free_space_->GridBackward(level, gradient_.data());
+    Lap(clock, Phase::kGrid);
     const size_t begin = field_->grid().level_begin(level);
     AdamUpdate(table_step, field_->grid().level_size(level), &state_.parameters[begin], &gradient_[begin],
                &state_.first[begin], &state_.second[begin]);
+    Lap(clock, Phase::kAdam);
   });
   UpdateGains(step);
   if (refines_poses()) UpdatePoses(progress);

@@ -12,6 +12,7 @@
 #include "recon/network/adam.h"
 #include "recon/training/free_space.h"
 #include "recon/training/options.h"
+#include "recon/training/phase_clock.h"
 #include "recon/training/pose_refinement.h"
 #include "recon/training/ray_loss.h"
 #include "recon/training/ray_sampler.h"
@@ -51,6 +52,11 @@ class Trainer {
   // progress: how much of the run is done, 0…1; the schedules follow it.
   StepReport Step(double progress);
 
+  // Steps measure their phases from then on.
+  void MeasurePhases();
+  // Over the steps since then, threads added up.
+  PhaseSeconds phase_seconds() const;
+
   const Field<float>& field() const { return *field_; }
   // The field's parameters as they are now, its tables as its grid reads them.
   const float* Weights();
@@ -79,6 +85,7 @@ class Trainer {
     std::vector<float> log_gain_gradient;
     std::vector<float> pose_gradient;  // empty where poses stay as they are given
     LossTerms terms;
+    std::unique_ptr<PhaseClock> clock;  // null where phases aren't measured
     bool finite = true;  // loss and gradient
   };
   bool has_grid() const { return field_->grid_size() > 0; }
@@ -110,6 +117,7 @@ class Trainer {
   WeightNorm<float> norm_;
   LineVector<float> weights_;  // the field's parameters, where they aren't what is learnt
   std::vector<Chunk> chunks_;
+  std::vector<std::unique_ptr<PhaseClock>> update_clocks_;  // one a task of the update; null as the chunks'
   std::unique_ptr<FreeSpace<float>> free_space_;
   std::vector<Vec3f> camera_places_;  // that it looks at
   std::mutex idle_mutex_;

@@ -192,10 +192,21 @@ Vec3d TrainingFrames::MeanRadiance(int frame) const {
   return sum / (frames_[frame].gain * static_cast<double>(rays_.size()));
 }
 
+// Two independent numbers from the upper and the lower half.
+TrainingFrames::Place TrainingFrames::PlaceOf(uint64_t draw) const {
+  return {((draw >> 32) * frames_.size()) >> 32, ((draw & 0xffffffffull) * rays_.size()) >> 32};
+}
+
+void TrainingFrames::Prefetch(uint64_t draw) const {
+  const auto [frame, pixel] = PlaceOf(draw);
+  __builtin_prefetch(&frames_[frame].rgb[3 * pixel]);
+  __builtin_prefetch(&rays_[pixel]);
+  __builtin_prefetch(&vignetting_[pixel]);
+  __builtin_prefetch(&pattern_[pixel]);
+}
+
 void TrainingFrames::Draw(uint64_t draw, const Vec3d& origin, RayBatch<float>::Ray* ray) const {
-  // Two independent numbers from the upper and the lower half.
-  const size_t frame_index = ((draw >> 32) * frames_.size()) >> 32;
-  const size_t pixel = ((draw & 0xffffffffull) * rays_.size()) >> 32;
+  const auto [frame_index, pixel] = PlaceOf(draw);
   const Frame& frame = frames_[frame_index];
   const Pose& pose = poses_[frame_index];
   ray->origin = (pose.translation() - origin).cast<float>();
@@ -204,7 +215,8 @@ void TrainingFrames::Draw(uint64_t draw, const Vec3d& origin, RayBatch<float>::R
   const float normaliser = static_cast<float>(frame.gain * Normaliser(pixel) * scale_);
   ray->exposure = lit_ ? 1 / (pattern_[pixel] * static_cast<float>(scale_)) : 1.0f;
   const float gamma = static_cast<float>(1 / inverse_gamma());
-  ray->floor = std::pow(static_cast<float>(kHalfStep), gamma) / normaliser;
+  const float darkest = std::pow(static_cast<float>(kHalfStep), gamma);
+  ray->floor = darkest / normaliser;
   for (int c = 0; c < 3; ++c) {
     const uint8_t value = frame.rgb[3 * pixel + c];
     ray->bound[c] = value == 255 ? PixelBound::kAtLeast
@@ -212,7 +224,7 @@ void TrainingFrames::Draw(uint64_t draw, const Vec3d& origin, RayBatch<float>::R
                                  : PixelBound::kExact;
     const float seen = value == 0 ? static_cast<float>(kHalfStep) : value / 255.0f;
     if (lit_) {
-      const float linear = value == 0 ? std::pow(static_cast<float>(kHalfStep), gamma) : decoded_[value];
+      const float linear = value == 0 ? darkest : decoded_[value];
       ray->observed[c] = std::pow(linear / normaliser, 1 / gamma);
     } else {
       ray->observed[c] = seen;

@@ -59,6 +59,8 @@ class TrainingFrames {
   // Fills the pixel's part of a ray: direction and origin relative to `origin`, frame, exposure, floor,
   // observed value and its bounds. `draw`: 64 random bits that choose frame and pixel, uniformly.
   void Draw(uint64_t draw, const Vec3d& origin, RayBatch<float>::Ray* ray) const;
+  // Before a number of draws, so that they don't wait for memory one by one.
+  void Prefetch(uint64_t draw) const;
 
  private:
   struct Frame {
@@ -77,6 +79,11 @@ class TrainingFrames {
   bool lit_;
   bool gains_known_ = true;
   double hue_slope_ = 0;
+  struct Place {
+    size_t frame, pixel;
+  };
+  Place PlaceOf(uint64_t draw) const;
+
   std::vector<int> numbers_;
   std::vector<Pose> poses_;
   std::vector<Frame> frames_;
