@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "common/random.h"
 #include "recon/surface/volume.h"
@@ -17,6 +18,8 @@ constexpr float kLeastWeight = 1e-5f;
 void ImportanceSampler::PlaceUniform(const float* parameters, int count, uint64_t key,
                                      const RayBatch<float>& batch) {
   const size_t rays = batch.rays.size();
+  all_.resize(rays);
+  std::iota(all_.begin(), all_.end(), 0);
   look_.resize(rays * count);
   for (size_t r = 0; r < rays; ++r) {
     const auto& ray = batch.rays[r];
@@ -25,7 +28,7 @@ void ImportanceSampler::PlaceUniform(const float* parameters, int count, uint64_
     for (int k = 0; k < count; ++k)
       look_[k * rays + r] = kNearest_mm + (far - kNearest_mm) * (k + jitter) / count;
   }
-  LookAlongRays(*field_, parameters, batch, look_, &pass_);
+  LookAlongRays(*field_, parameters, batch, all_, look_, &pass_);
   samples_.resize(rays);
   for (size_t r = 0; r < rays; ++r) {
     samples_[r].clear();
@@ -69,7 +72,7 @@ void ImportanceSampler::AddRound(const float* parameters, int count, float sharp
       look_[k * rays + r] = start + part * (samples[section + 1].distance - start);
     }
   }
-  LookAlongRays(*field_, parameters, batch, look_, &pass_);
+  LookAlongRays(*field_, parameters, batch, all_, look_, &pass_);
   for (size_t r = 0; r < rays; ++r) {
     for (int k = 0; k < count; ++k)
       samples_[r].push_back({look_[k * rays + r], pass_.value.At(0, static_cast<int>(k * rays + r))});

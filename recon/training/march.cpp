@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "common/random.h"
 
@@ -9,6 +10,9 @@ namespace lumen {
 namespace {
 
 constexpr int kSecantSteps = 3;
+
+// Of the look-ups that find where a ray leaves the lumen: most rays have left it before the last ones.
+constexpr int kLooksAtOnce = 4;
 
 // The steepness, as |df/dt|, that spacing counts with: at grazing incidence the density's layer is longer
 // along the ray than its width, but by no more than five times is it followed.
@@ -28,32 +32,49 @@ void Marcher::FindCrossings(const float* parameters, const TrainOptions::Samplin
                             const RayBatch<float>& batch) {
   const int rays = static_cast<int>(batch.rays.size());
   far_.resize(rays);
-  look_.resize(size_t(rays) * options.coarse);
+  jitter_.resize(rays);
+  crossings_.resize(rays);
+  open_.resize(rays);
   for (int r = 0; r < rays; ++r) {
     far_[r] = FarthestSample(field_->box(), batch.rays[r].origin, batch.rays[r].direction);
-    const float jitter = UniformFloat(RandomBits(key, r, 0));
-    for (int k = 0; k < options.coarse; ++k) {
-      // Denser near the camera, where folds are seen thin; the last look-up is at the far end itself.
-      const float u = k + 1 == options.coarse ? 1.0f : (k + jitter) / (options.coarse - 1);
-      look_[size_t(k) * rays + r] = kNearest_mm + (far_[r] - kNearest_mm) * u * std::sqrt(u);
+    jitter_[r] = UniformFloat(RandomBits(key, r, 0));
+    open_[r] = r;
+  }
+  for (int begin = 0; begin < options.coarse && !open_.empty(); begin += kLooksAtOnce) {
+    const int end = std::min(begin + kLooksAtOnce, options.coarse);
+    look_.clear();
+    for (int k = begin; k < end; ++k) {
+      for (int r : open_) {
+        // Denser near the camera, where folds are seen thin; the last look-up is at the far end itself.
+        const float u = k + 1 == options.coarse ? 1.0f : (k + jitter_[r]) / (options.coarse - 1);
+        look_.push_back(kNearest_mm + (far_[r] - kNearest_mm) * u * std::sqrt(u));
+      }
     }
+    LookAlongRays(*field_, parameters, batch, open_, look_, &pass_);
+    const size_t asked = open_.size();
+    size_t still_open = 0;
+    for (size_t i = 0; i < asked; ++i) {
+      Crossing& c = crossings_[open_[i]];
+      bool met = false;
+      for (int k = begin; k < end && !met; ++k) {
+        const size_t at = size_t(k - begin) * asked + i;
+        const float value = *pass_.value.Column(at);
+        c = {k > 0 ? c.outside : look_[at], look_[at], k > 0 ? c.outside_value : value, value};
+        met = !(value > 0);
+      }
+      if (!met) open_[still_open++] = open_[i];
+    }
+    open_.resize(still_open);
   }
-  LookAlongRays(*field_, parameters, batch, look_, &pass_);
-  crossings_.resize(rays);
-  for (int r = 0; r < rays; ++r) {
-    int k = 0;
-    while (k + 1 < options.coarse && pass_.value.At(0, k * rays + r) > 0) ++k;
-    const int before = std::max(k - 1, 0);
-    crossings_[r] = {look_[size_t(before) * rays + r], look_[size_t(k) * rays + r],
-                     pass_.value.At(0, before * rays + r), pass_.value.At(0, k * rays + r)};
-  }
+  open_.resize(rays);
+  std::iota(open_.begin(), open_.end(), 0);
   look_.resize(rays);
   for (int step = 0; step < kSecantSteps; ++step) {
     for (int r = 0; r < rays; ++r) {
       const Crossing& c = crossings_[r];
       look_[r] = ZeroBetween(c.inside, c.outside, c.inside_value, c.outside_value);
     }
-    LookAlongRays(*field_, parameters, batch, look_, &pass_);
+    LookAlongRays(*field_, parameters, batch, open_, look_, &pass_);
     for (int r = 0; r < rays; ++r) {
       Crossing& c = crossings_[r];
       const float value = pass_.value.At(0, r);

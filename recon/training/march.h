@@ -25,7 +25,8 @@ class Marcher : public RaySampler {
 
   const Field<float>* field_;
   Field<float>::ValuePass pass_;
-  std::vector<float> look_, far_, placed_;
+  std::vector<float> look_, far_, jitter_, placed_;
+  std::vector<int> open_;  // rays that are looked along
   std::vector<Crossing> crossings_;
 };
 

@@ -24,14 +24,19 @@ float FarthestSample(const Eigen::AlignedBox3d& box, const Vec3f& origin, const 
 }
 
 void LookAlongRays(const Field<float>& field, const float* parameters, const RayBatch<float>& batch,
-                   const std::vector<float>& distance, Field<float>::ValuePass* pass) {
-  const int count = static_cast<int>(distance.size());
-  const int rays = static_cast<int>(batch.rays.size());
-  pass->positions.Resize(3, TilesFor(count));
-  for (int i = 0; i < TilesFor(count) * kTile; ++i) {
-    const int k = std::min(i, count - 1);
-    const auto& ray = batch.rays[k % rays];
-    for (int d = 0; d < 3; ++d) pass->positions.At(d, i) = ray.origin[d] + distance[k] * ray.direction[d];
+                   const std::vector<int>& along, const std::vector<float>& distance,
+                   Field<float>::ValuePass* pass) {
+  const size_t count = distance.size();
+  pass->positions.Resize(3, TilesFor(static_cast<int>(count)));
+  const size_t padded = size_t(pass->positions.tiles()) * kTile;
+  size_t next = 0;
+  for (size_t i = 0; i < padded; ++i) {
+    const bool beyond = i >= count;  // the last tile is filled up with copies of the last
+    const auto& ray = batch.rays[along[beyond ? (count - 1) % along.size() : next]];
+    const float t = distance[beyond ? count - 1 : i];
+    float* position = pass->positions.Column(i);
+    for (int d = 0; d < 3; ++d) position[d * kTile] = ray.origin[d] + t * ray.direction[d];
+    if (++next == along.size()) next = 0;
   }
   field.Value(parameters, pass);
 }

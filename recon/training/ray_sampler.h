@@ -31,8 +31,10 @@ std::unique_ptr<RaySampler> MakeRaySampler(const TrainOptions::Sampling& options
 // negative for certain.
 float FarthestSample(const Eigen::AlignedBox3d& box, const Vec3f& origin, const Vec3f& direction);
 
-// Signed distances, in pass->value, at so many distances; distance[i] is along batch.rays[i % rays].
+// Signed distances, in pass->value, at so many distances; distance[i] is along batch.rays[along[i % n]], n
+// being the number of `along`.
 void LookAlongRays(const Field<float>& field, const float* parameters, const RayBatch<float>& batch,
-                   const std::vector<float>& distance, Field<float>::ValuePass* pass);
+                   const std::vector<int>& along, const std::vector<float>& distance,
+                   Field<float>::ValuePass* pass);
 
 }  // namespace lumen
