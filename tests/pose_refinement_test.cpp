@@ -6,6 +6,7 @@
 #include <Eigen/Geometry>
 
 #include "common/random.h"
+#include "recon/training/pose_noise.h"
 #include "recon/training/trainer.h"
 #include "tests/small_sequence.h"
 
@@ -27,6 +28,39 @@ PoseError ErrorOf(const std::vector<Pose>& poses, const std::vector<Pose>& truth
     error.turn_rad += share * angle * angle;
   }
   return {std::sqrt(error.shift_mm), std::sqrt(error.turn_rad)};
+}
+
+TEST(PoseNoise, HasTheRootMeanSquareThatItIsToldAndFollowsFromSeedAndFrame) {
+  Sequence exact;
+  for (int number = 0; number < 4000; ++number) {
+    SequenceFrame frame;
+    frame.number = number;
+    frame.world_from_camera.translate(Vec3d(1, 2, 3));
+    frame.world_from_camera.rotate(Eigen::AngleAxisd(1, Vec3d(0, 0.6, 0.8)));
+    exact.frames.push_back(frame);
+  }
+  Sequence noisy = exact, again = exact, other = exact;
+  const PoseNoise noise{0.5, 0.005};
+  AddPoseNoise(noise, 7, &noisy);
+  AddPoseNoise(noise, 7, &again);
+  AddPoseNoise(noise, 8, &other);
+  double shift = 0, angle = 0;
+  Vec3d mean = Vec3d::Zero();
+  for (size_t i = 0; i < exact.frames.size(); ++i) {
+    const Pose &a = exact.frames[i].world_from_camera, &b = noisy.frames[i].world_from_camera;
+    EXPECT_EQ(b.matrix(), again.frames[i].world_from_camera.matrix());
+    EXPECT_NE(b.matrix(), other.frames[i].world_from_camera.matrix());
+    const Vec3d by = b.translation() - a.translation();
+    mean += by / double(exact.frames.size());
+    shift += by.squaredNorm() / double(exact.frames.size());
+    const double turned = Eigen::AngleAxisd(a.rotation().transpose() * b.rotation()).angle();
+    angle += turned * turned / double(exact.frames.size());
+  }
+  // Four standard errors of 4000 frames: the mean's is 0.5 / √4000 at most, a root mean square's relative one
+  // √(2/3 / 4000) / 2.
+  EXPECT_LT(mean.norm(), 4 * 0.5 / std::sqrt(4000.0));
+  EXPECT_NEAR(std::sqrt(shift), 0.5, 0.5 * 4 * std::sqrt(2.0 / 3 / 4000) / 2);
+  EXPECT_NEAR(std::sqrt(angle), 0.005, 0.005 * 4 * std::sqrt(2.0 / 3 / 4000) / 2);
 }
 
 TEST(PoseRefinement, MotionsComeToPosesAndRaysAlike) {

@@ -212,6 +212,8 @@ void ReadRest(const ConfigTable& root, TrainOptions* options) {
     p.noise_mm = poses->Number("noise_mm", p.noise_mm, kPositive);
     p.noise_rad = poses->Number("noise_rad", p.noise_rad, kPositive);
     p.pull = poses->Number("pull", p.pull, kNotNegative);
+    p.disturb_mm = poses->Number("disturb_mm", p.disturb_mm, kNotNegative);
+    p.disturb_rad = poses->Number("disturb_rad", p.disturb_rad, kNotNegative);
   }
   if (const auto extract = root.Optional("extract")) {
     options->extract_cell_mm = extract->Number("cell_mm", options->extract_cell_mm, {1e-3, 1e3});
@@ -337,7 +339,8 @@ std::string FormatTrainOptions(const TrainOptions& o) {
       << "\ntranslation_rate_mm = " << o.poses.translation_rate_mm
       << "\nrotation_rate_rad = " << o.poses.rotation_rate_rad << "\nstart = " << o.poses.start
       << "\nnoise_mm = " << o.poses.noise_mm << "\nnoise_rad = " << o.poses.noise_rad
-      << "\npull = " << o.poses.pull << "\n\n[extract]\ncell_mm = " << o.extract_cell_mm
+      << "\npull = " << o.poses.pull << "\ndisturb_mm = " << o.poses.disturb_mm
+      << "\ndisturb_rad = " << o.poses.disturb_rad << "\n\n[extract]\ncell_mm = " << o.extract_cell_mm
       << "\ncontinue_lumen = " << (o.continue_lumen ? "true" : "false") << "\n";
   return out.str();
 }

@@ -97,6 +97,9 @@ struct TrainOptions {
     double noise_mm = 0.5;
     double noise_rad = 0.005;
     double pull = 1e-4;
+    // Root mean squares of errors that the given poses are disturbed by first, to see what they cost
+    // (recon/training/pose_noise.h).
+    double disturb_mm = 0, disturb_rad = 0;
   } poses;
 
   double extract_cell_mm = 0.75;

@@ -21,6 +21,7 @@
 #include "recon/training/checkpoint.h"
 #include "recon/training/continue_lumen.h"
 #include "recon/training/plausible.h"
+#include "recon/training/pose_noise.h"
 #include "recon/training/trainer.h"
 
 namespace lumen {
@@ -321,7 +322,11 @@ std::filesystem::path MeshAtFile(const std::filesystem::path& folder, double par
 }
 
 TrainResult Train(const Sequence& sequence, const TrainOptions& options, const TrainRun& run) {
-  return Run(sequence, options, run).Go();
+  const auto& poses = options.poses;
+  if (poses.disturb_mm == 0 && poses.disturb_rad == 0) return Run(sequence, options, run).Go();
+  Sequence disturbed = sequence;
+  AddPoseNoise({poses.disturb_mm, poses.disturb_rad}, run.seed, &disturbed);
+  return Run(disturbed, options, run).Go();
 }
 
 }  // namespace lumen

@@ -12,12 +12,6 @@
 
 namespace lumen {
 
-// Errors of the poses, root mean squares over frames; each component is normal, frames independent.
-struct PoseNoise {
-  double shift_mm = 0.5;
-  double angle_rad = 0.3 / 180 * kPi;
-};
-
 // One departure. Functions that are empty change nothing.
 struct BudgetEffect {
   std::string name;
@@ -58,8 +52,5 @@ struct BudgetVariant {
 
 // No effect, each step of each alone, all, all but each (and but its later steps); none of them twice.
 std::vector<BudgetVariant> BudgetVariantsOf(const std::vector<BudgetEffect>& effects, bool all_but);
-
-// Disturbs every frame's pose: rotation vector and shift, drawn by seed and frame.
-void AddPoseNoise(const PoseNoise& noise, uint64_t seed, Sequence* sequence);
 
 }  // namespace lumen
