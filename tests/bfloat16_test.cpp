@@ -1,14 +1,17 @@
-// Products of a layer with factors rounded to bfloat16, portable and by AVX512-BF16, against double. ε =
-// 2⁻²⁴, a float's rounding, u = 2⁻⁸, a bfloat16's.
+// Products of a layer with factors rounded to bfloat16, portable, by AVX512-BF16 and by AMX's tiles, against
+// double. ε = 2⁻²⁴, a float's rounding, u = 2⁻⁸, a bfloat16's.
 #include "recon/network/bfloat16.h"
 
 #include <gtest/gtest.h>
 
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <functional>
 #include <limits>
 
+#include "recon/network/bfloat16_arithmetic.h"
+#include "recon/network/bfloat16_tiles.h"
 #include "recon/network/mlp.h"
 #include "tests/bfloat16_reference.h"
 #include "tests/finite_difference.h"
@@ -19,9 +22,54 @@ namespace {
 using test::NearestBfloat16;
 using test::Random;
 
+// AMX's tiles by Intel's description of its instructions (Software Developer's Manual, volume 2: TILELOADD,
+// TILESTORED, TDPBF16PS), so that the loops over them are tested on any processor.
+struct ModelTiles {
+  struct Tile {
+    uint32_t row[16][16];
+  };
+  static inline Tile tiles[8];
+
+  static void Prepare() {}
+  template <int kTileNumber>
+  static void Load(const void* from, size_t stride) {
+    for (int r = 0; r < 16; ++r)
+      std::memcpy(tiles[kTileNumber].row[r], static_cast<const uint32_t*>(from) + r * stride, 64);
+  }
+  template <int kTileNumber>
+  static void Store(void* to, size_t stride) {
+    for (int r = 0; r < 16; ++r)
+      std::memcpy(static_cast<uint32_t*>(to) + r * stride, tiles[kTileNumber].row[r], 64);
+  }
+  // The sums of the pairs' first and second numbers are apart until the end. Numbers below the normal ones
+  // count as 0.
+  template <int kSum, int kA, int kB>
+  static void AddProducts() {
+    const auto normal = [](float v) { return std::abs(v) < 0x1p-126f ? 0.0f : v; };
+    const auto number = [&](uint32_t bits) { return normal(std::bit_cast<float>(bits)); };
+    for (int m = 0; m < 16; ++m) {
+      for (int n = 0; n < 16; ++n) {
+        float first = 0, second = 0;
+        for (int k = 0; k < 16; ++k) {
+          const uint32_t a = tiles[kA].row[m][k], b = tiles[kB].row[k][n];
+          first = normal(std::fma(number(a << 16), number(b << 16), first));
+          second = normal(std::fma(number(a & 0xffff0000), number(b & 0xffff0000), second));
+        }
+        uint32_t& sum = tiles[kSum].row[m][n];
+        sum = std::bit_cast<uint32_t>(normal(number(sum) + normal(first + second)));
+      }
+    }
+  }
+};
+
+const Bfloat16Kernels& ModelTileKernels() {
+  return Bfloat16TileLoops<ModelTiles, PortableArithmetic>::kKernels;
+}
+
 std::vector<const Bfloat16Kernels*> AllKernels() {
-  std::vector<const Bfloat16Kernels*> all = {&PortableBfloat16Kernels()};
-  if (Avx512Bfloat16Kernels()) all.push_back(Avx512Bfloat16Kernels());
+  std::vector<const Bfloat16Kernels*> all = {&PortableBfloat16Kernels(), &ModelTileKernels()};
+  for (const Bfloat16Kernels* here : {Avx512Bfloat16Kernels(), AmxBfloat16Kernels()})
+    if (here) all.push_back(here);
   return all;
 }
 
@@ -135,7 +183,8 @@ double Worst(const std::vector<float>& results, const std::vector<Sum>& sums, do
 constexpr struct {
   int outputs, inputs, tiles;
 } kShapes[] = {{1, 1, 1},   {3, 19, 2}, {5, 7, 1},  {16, 3, 1}, {7, 16, 2},
-               {13, 33, 1}, {6, 64, 1}, {9, 67, 2}, {2, 129, 1}};
+               {13, 33, 1}, {6, 64, 1}, {9, 67, 2}, {2, 129, 1}, {32, 64, 1},
+               {35, 70, 2}};
 
 double Exact(float value) { return value; }
 
@@ -204,8 +253,9 @@ TEST(Bfloat16, Avx512RoundsAsThePortableKernelsDo) {
     for (size_t k = 0; k < 2; ++k) {
       rows[k].resize(kNumbers);
       columns[k].resize(kNumbers);
-      AllKernels()[k]->pair_rows(2, kNumbers, from.data(), rows[k].data());
-      AllKernels()[k]->pair_columns(1, 2 * kNumbers, from.data(), columns[k].data());
+      const Bfloat16Kernels& kernels = k == 0 ? PortableBfloat16Kernels() : *Avx512Bfloat16Kernels();
+      kernels.pair_rows(2, kNumbers, from.data(), rows[k].data());
+      kernels.pair_columns(1, 2 * kNumbers, from.data(), columns[k].data());
     }
     ASSERT_EQ(rows[0], rows[1]);
     ASSERT_EQ(columns[0], columns[1]);

@@ -1,25 +1,26 @@
 #include "recon/network/bfloat16_kernels.h"
 
-#include "recon/network/bfloat16.h"
-#include "recon/network/bfloat16_loops.h"
+#include <algorithm>
+
+#include "recon/network/bfloat16_arithmetic.h"
 
 namespace lumen {
+
 namespace {
 
-// A bfloat16 is a float with its lower half 0.
-struct PortableArithmetic {
-  static void Pair(const float* low, const float* high, uint32_t* to) {
-    for (int i = 0; i < kPairLanes; ++i) to[i] = Bfloat16Of(low[i]) | Bfloat16Of(high[i]) << 16;
-  }
-  static void PairNeighbours(const float* from, uint32_t* to) {
-    for (int i = 0; i < kPairLanes; ++i) to[i] = Bfloat16Of(from[2 * i]) | Bfloat16Of(from[2 * i + 1]) << 16;
-  }
-  static void AddProducts(const PairLanes& a, const PairLanes& b, SumLanes* sum) {
-    constexpr uint32_t kUpper = 0xffff0000;
-    *sum += (SumLanes)(a << 16) * (SumLanes)(b << 16);
-    *sum += (SumLanes)(a & kUpper) * (SumLanes)(b & kUpper);
-  }
-};
+// Whether whole numbers, whose sums are exact in any order, have the products that they must.
+bool MultipliesRight(const Bfloat16Kernels& kernels) {
+  constexpr int kRows = 19, kPairs = 21;
+  uint32_t weight[kRows * kPairs];
+  alignas(64) uint32_t x[kPairs * kTile];
+  alignas(64) float found[kRows * kTile], expected[kRows * kTile];
+  const auto pair = [](int i) { return Bfloat16Of(float(i % 13 - 6)) | Bfloat16Of(float(i % 7 - 3)) << 16; };
+  for (int i = 0; i < kRows * kPairs; ++i) weight[i] = pair(i);
+  for (int i = 0; i < kPairs * kTile; ++i) x[i] = pair(5 * i + i / kTile);
+  kernels.multiply(weight, kPairs, 1, nullptr, kRows, kPairs, x, found);
+  PortableBfloat16Kernels().multiply(weight, kPairs, 1, nullptr, kRows, kPairs, x, expected);
+  return std::equal(found, found + kRows * kTile, expected);
+}
 
 }  // namespace
 
@@ -34,9 +35,24 @@ const Bfloat16Kernels* Avx512Bfloat16Kernels() {
 #endif
 }
 
+const Bfloat16Kernels* AmxBfloat16Kernels() {
+#ifdef __x86_64__
+  static const bool here = Avx512Bfloat16Kernels() && __builtin_cpu_supports("amx-tile") &&
+                           __builtin_cpu_supports("amx-bf16");
+  if (!here) return nullptr;
+  // No machine that this was written on has them, so they are tried before they are used.
+  static const Bfloat16Kernels* const permitted = PermittedAmxBfloat16Kernels();
+  static const bool right = permitted && MultipliesRight(*permitted);
+  return right ? permitted : nullptr;
+#else
+  return nullptr;
+#endif
+}
+
 const Bfloat16Kernels& FastestBfloat16Kernels() {
-  const Bfloat16Kernels* fastest = Avx512Bfloat16Kernels();
-  return fastest ? *fastest : PortableBfloat16Kernels();
+  for (const Bfloat16Kernels* fastest : {AmxBfloat16Kernels(), Avx512Bfloat16Kernels()})
+    if (fastest) return *fastest;
+  return PortableBfloat16Kernels();
 }
 
 }  // namespace lumen

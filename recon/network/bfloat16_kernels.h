@@ -1,12 +1,12 @@
 // A layer's products (recon/network/product.h) with factors rounded to bfloat16 and sums in float, as the
 // processor at hand computes them fastest. Two numbers that follow each other in a sum are a pair of 32 bits,
 // the first in the lower half: the AVX512-BF16 instruction VDPBF16PS adds the products of sixteen such pairs
-// at once, twice the work of a multiply-add in float. (AMX, which would multiply whole tiles, isn't used.)
+// at once, twice the work of a multiply-add in float; AMX's TDPBF16PS multiplies tiles of 16 × 16 pairs.
 //
 // Factors are rounded to nearest, ties to even: off by at most 2⁻⁸ of themselves. A product of two has 16
-// bits and is exact in float, so what the sums are off by beyond that is float's rounding. AVX512-BF16 takes
-// numbers below the normal ones, 2⁻¹²⁶, for 0, as factors and as sums; the portable kernels keep them. The
-// order of a pair's two additions, and whether there is a rounding between them, is the processor's.
+// bits and is exact in float, so what the sums are off by beyond that is float's rounding. AVX512-BF16 and AMX
+// take numbers below the normal ones, 2⁻¹²⁶, for 0, as factors and as sums; the portable kernels keep them.
+// The order of the additions, and whether there is a rounding between a pair's two, is the processor's.
 #pragma once
 
 #include <cstddef>
@@ -37,6 +37,7 @@ struct Bfloat16Kernels {
 const Bfloat16Kernels& PortableBfloat16Kernels();
 // Null where the processor, or what this was compiled with, doesn't have these instructions.
 const Bfloat16Kernels* Avx512Bfloat16Kernels();
+const Bfloat16Kernels* AmxBfloat16Kernels();
 const Bfloat16Kernels& FastestBfloat16Kernels();
 
 }  // namespace lumen

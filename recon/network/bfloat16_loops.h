@@ -1,9 +1,8 @@
 // The loops of Bfloat16Kernels over an arithmetic, which does with sixteen pairs at a time
 //   Pair(low, high, to)           to[i] = the pair of low[i] and high[i], rounded, i < 16
 //   PairNeighbours(from, to)      to[i] = that of from[2i] and from[2i + 1]
-//   AddProducts(a, b, sum)        sum[i] += a[i]₀ · b[i]₀ + a[i]₁ · b[i]₁.
-// Each of the two files that instantiate them is compiled for another processor, so an arithmetic is a type
-// of its file alone: the linker must not take one's instructions for the other's.
+//   AddProducts(a, b, sum)        sum[i] += a[i]₀ · b[i]₀ + a[i]₁ · b[i]₁
+// (recon/network/bfloat16_arithmetic.h).
 #pragma once
 
 #include <cstring>
@@ -103,6 +102,13 @@ struct Bfloat16Loops {
       if (!(r & kStep)) Exchange<kStep>(square + r, std::make_index_sequence<kPairLanes>());
   }
 
+  static void Transpose(PairLanes* square) {
+    ExchangeAll<1>(square);
+    ExchangeAll<2>(square);
+    ExchangeAll<4>(square);
+    ExchangeAll<8>(square);
+  }
+
   // Columns [first, first + kTile) of a tile's transpose, a pair of samples a row: to[p · kTile + i] =
   // x[first + i] at samples 2p and 2p + 1, 0 beyond the last up to a whole vector. Returns how many columns
   // there are.
@@ -115,10 +121,7 @@ struct Bfloat16Loops {
         for (int r = 0; r < rows; ++r)
           Arithmetic::PairNeighbours(x + size_t(first + c + r) * kTile + 2 * p,
                                      reinterpret_cast<uint32_t*>(square + r));
-        ExchangeAll<1>(square);
-        ExchangeAll<2>(square);
-        ExchangeAll<4>(square);
-        ExchangeAll<8>(square);
+        Transpose(square);
         for (int r = 0; r < kPairLanes; ++r)
           *reinterpret_cast<PairLanes*>(to + size_t(p + r) * kTile + c) = square[r];
       }
@@ -159,5 +162,7 @@ struct Bfloat16Loops {
 
 // Of bfloat16_avx512.cpp; null where it is compiled without these instructions.
 extern const Bfloat16Kernels* const kAvx512Bfloat16Kernels;
+// Of bfloat16_amx.cpp, for a processor that has them; null there likewise, or where the system doesn't permit.
+const Bfloat16Kernels* PermittedAmxBfloat16Kernels();
 
 }  // namespace lumen
