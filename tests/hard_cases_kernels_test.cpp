@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "recon/network/adam.h"
 #include "recon/surface/shading.h"
 #include "recon/surface/volume.h"
 #include "recon/training/loss.h"
@@ -81,6 +82,10 @@ TEST(HardCasesTraining, WeightsOfAMillionRaysAreThoseOfDouble) {
       bound += here + next + 4 * kRounding;
       const double most = std::min(bound, 1.0);
       ASSERT_NEAR(found.weight[k], expected.weight[k], most) << i << " " << k;
+      // Φ(x) is off by |x| Φ(x) Φ(−x) of x's rounding at most, and some of its own; below the least normal
+      // number by that.
+      const double x = std::abs(s * ray.distance[k]), phi = expected.occupancy[k];
+      ASSERT_NEAR(found.occupancy[k], phi, kRounding * (6 + 2 * x) * phi + 0x1p-126) << i << " " << k;
       worst = std::max(worst, std::abs(found.weight[k] - expected.weight[k]) / most);
     }
     EXPECT_NEAR(sum, 1, 2 * Ray::kSamples * kRounding);
@@ -272,6 +277,32 @@ TEST(HardCasesTraining, ShadingOfAMillionPlacesIsThatOfDouble) {
         ASSERT_LT(least, 8 * kRounding * (1 + 5 / nearest)) << d;
       }
     }
+  }
+}
+
+// From any state that training can come to: a gradient below kLargestGradient, moments of such. The moments
+// are sums of two numbers, off by 3 and 4 roundings of their size; the step takes the first's whole and half
+// of the second's, which is relative, beside its own 5.
+TEST(HardCasesTraining, AdamOfAMillionStatesIsThatOfDouble) {
+  uint64_t state = 11;
+  const double beta1 = static_cast<float>(kAdamBeta1), fresh1 = 1 - static_cast<float>(kAdamBeta1);
+  for (int i = 0; i < kStates; ++i) {
+    const AdamStep step(1e-2, 1 + i % 5000, 0.99, i % 2 == 0 ? kLeastAdamEpsilon : 1e-4);
+    float parameter = static_cast<float>(Random(state)), before = parameter;
+    float gradient = static_cast<float>(RandomSize(state, -15, 8)), g = gradient;
+    float first = static_cast<float>(RandomSize(state, -15, 8)), m0 = first;
+    float second = static_cast<float>(std::abs(RandomSize(state, -30, 16))), v0 = second;
+    AdamUpdate(step, 1, &parameter, &gradient, &first, &second);
+    const double b2 = step.beta2, m = beta1 * m0 + fresh1 * g,
+                 v = b2 * v0 + double(1 - step.beta2) * g * double(g);
+    const double size = std::abs(beta1 * m0) + std::abs(fresh1 * g);
+    ASSERT_NEAR(first, m, 3 * kRounding * size) << i;
+    ASSERT_NEAR(second, v, 4 * kRounding * v) << i;
+    const double divisor = std::sqrt(v * step.second_correction) + step.epsilon,
+                 rate = double(step.rate) * step.first_correction;
+    const double moved = rate * m / divisor, most = rate * size / divisor;
+    ASSERT_NEAR(parameter, before - moved, kRounding * (10 * most + std::abs(before) + std::abs(moved))) << i;
+    ASSERT_EQ(gradient, 0);
   }
 }
 

@@ -182,7 +182,7 @@ TEST(MucusCoat, IsTheDiffuseWallWhereItDoesNothing) {
 // by 8/0.05.
 TEST(MucusCoat, FloatIsDoubleToRounding) {
   uint64_t state = 8;
-  for (int trial = 0; trial < 100000; ++trial) {
+  for (int trial = 0; trial < 1000000; ++trial) {
     FrameLight<float> light;
     light.camera = Vec3f(0.1f, 0.2f, 0);
     FrameLight<double> wide;

@@ -10,7 +10,10 @@
 
 #include "common/math.h"
 #include "recon/network/adam.h"
+#include "recon/surface/direction_map.h"
 #include "recon/surface/field.h"
+#include "recon/surface/gather.h"
+#include "recon/surface/mucus_coat.h"
 #include "recon/surface/shading.h"
 #include "recon/surface/volume.h"
 #include "recon/training/options.h"
@@ -312,25 +315,71 @@ void OpacityBackward(State& state) {
 }
 BENCHMARK(OpacityBackward);
 
-// Three guides off the axis; forward and backward are one.
+// A place under three guides off the axis; forward and backward are one.
+struct Lit {
+  FrameLight<float> light;
+  Vec3f output{-0.5f, -1, 0.2f}, normal = Vec3f(-0.2f, 0.4f, -1).normalized(), ambient{0.3f, 0.2f, 0.1f};
+  Panel<float> points = RandomPanel(3, kTiles, 20);
+  Lit() {
+    Light guides;
+    for (int i = 0; i < 3; ++i)
+      guides.sources.push_back({Vec3d(3.0 * (i - 1), i, 0), Vec3d::UnitZ(), 2.7, Vec3d(900, 800, 700)});
+    light = LightOfFrame<float>(guides, Pose::Identity(), Vec3d::Zero());
+  }
+  Vec3f Point(int i) const { return {points.At(0, i), points.At(1, i), 25 + points.At(2, i)}; }
+};
+
 void Shading_(State& state) {
-  Light light;
-  for (int i = 0; i < 3; ++i)
-    light.sources.push_back({Vec3d(3.0 * (i - 1), i, 0), Vec3d::UnitZ(), 2.7, Vec3d(900, 800, 700)});
-  const FrameLight<float> at = LightOfFrame<float>(light, Pose::Identity(), Vec3d::Zero());
+  const Lit lit;
   const auto kind = static_cast<Reflectance>(state.range(0));
-  const Vec3f output(-0.5f, -1, 0.2f), normal = Vec3f(-0.2f, 0.4f, -1).normalized(),
-                                       ambient(0.3f, 0.2f, 0.1f);
-  const Panel<float> points = RandomPanel(3, kTiles, 20);
   for (auto _ : state) {
-    for (int i = 0; i < kSamples; ++i) {
-      const Vec3f point(points.At(0, i), points.At(1, i), 25 + points.At(2, i));
-      benchmark::DoNotOptimize(Shade(kind, output, normal, at, point, ambient));
-    }
+    for (int i = 0; i < kSamples; ++i)
+      benchmark::DoNotOptimize(Shade(kind, lit.output, lit.normal, lit.light, lit.Point(i), lit.ambient));
   }
   CountSamples(state, kSamples);
 }
 BENCHMARK(Shading_)->Name("Shading")->Arg(0)->Arg(1);  // lambertian, free
+
+void ShadingOfCoat(State& state) {
+  const Lit lit;
+  ByCoat<float> by_coat;
+  for (auto _ : state) {
+    for (int i = 0; i < kSamples; ++i) {
+      benchmark::DoNotOptimize(ShadeCoated(MucusCoat<float>{0.5f, 0.3f, 1.33f}, lit.output, lit.normal,
+                                           lit.light, lit.Point(i), lit.ambient, &by_coat));
+      benchmark::DoNotOptimize(by_coat);
+    }
+  }
+  CountSamples(state, kSamples);
+}
+BENCHMARK(ShadingOfCoat);
+
+void SurroundingsLookUp(State& state) {
+  DirectionMap<float> map;
+  for (size_t i = 0; i < map.values.size(); ++i) map.values[i] = Vec3f::Constant(static_cast<float>(i));
+  const Panel<float> directions = RandomPanel(3, kTiles);
+  for (auto _ : state) {
+    for (int i = 0; i < kSamples; ++i)
+      benchmark::DoNotOptimize(map.At({directions.At(0, i), directions.At(1, i), directions.At(2, i)}));
+  }
+  CountSamples(state, kSamples);
+}
+BENCHMARK(SurroundingsLookUp);
+
+// What a camera's patches send each other once; argument: 1 = in lanes of float. A pair is a sample.
+void PatchesGather(State& state) {
+  constexpr int kPatches = 1024;
+  std::vector<Patch> patches(kPatches);
+  for (int i = 0; i < kPatches; ++i) {
+    const Vec3d d = DirectionMap<double>::Direction(i % DirectionMap<double>::kCells);
+    patches[i] = {20 * d, -d, 4, Vec3d::Constant(0.5), Vec3d::Ones()};
+  }
+  const std::vector<Vec3d> leaving(kPatches, Vec3d::Ones());
+  for (auto _ : state)
+    benchmark::DoNotOptimize(state.range(0) ? GatherInLanes(patches, leaving) : Gather(patches, leaving));
+  CountSamples(state, kPatches * kPatches);
+}
+BENCHMARK(PatchesGather)->Arg(0)->Arg(1);
 
 void InitialSurfaceEvaluate(State& state) {
   const InitialSurface initial({}, {Pose::Identity()}, Vec3d::Zero());
