@@ -166,12 +166,17 @@ TEST(Train, DryRunCountsMeasuresAndLeavesNoFile) {
   EXPECT_GT(estimate.seconds_per_iteration, 0);
   EXPECT_DOUBLE_EQ(estimate.seconds, 1000 * estimate.seconds_per_iteration);
   EXPECT_GT(estimate.resident_bytes, estimate.state_bytes);
+  // Every part of a step that there is takes some of it; without a grid that part takes none.
+  for (size_t i = 0; i < kPhaseNames.size(); ++i)
+    EXPECT_EQ(estimate.phase_seconds[i] > 0, i != static_cast<size_t>(Phase::kGrid)) << kPhaseNames[i];
   const int status =
       std::system((std::string(LUMEN_COMMAND) + " train " + SmallSequence().folder.string() +
                    " --dry-run --iterations 7 --json " + (folder / "cost.json").string() + " >/dev/null")
                       .c_str());
   ASSERT_EQ(status, 0);
-  EXPECT_NE(ReadFile(folder / "cost.json").find("\"iterations\": 7"), std::string::npos);
+  const std::string cost = ReadFile(folder / "cost.json");
+  EXPECT_NE(cost.find("\"iterations\": 7"), std::string::npos);
+  EXPECT_NE(cost.find("\"grid\""), std::string::npos) << cost;
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
   EXPECT_EQ(std::filesystem::last_write_time(SmallSequence().folder), before);
 }

@@ -33,9 +33,9 @@ using RaySeen = std::pair<std::array<float, 3>, int>;
 
 std::map<RaySeen, Vec3f> AllDrawn(const TrainingFrames& frames, int draws) {
   std::map<RaySeen, Vec3f> seen;
-  for (int i = 0; i < draws; ++i) {
-    RayBatch<float>::Ray ray;
-    frames.Draw(RandomBits(5, static_cast<uint64_t>(i)), Vec3d::Zero(), &ray);
+  std::vector<RayBatch<float>::Ray> rays(static_cast<size_t>(draws));
+  frames.Draw(5, 0, Vec3d::Zero(), &rays);
+  for (const auto& ray : rays) {
     seen[{{ray.direction.x(), ray.direction.y(), ray.direction.z()}, ray.frame}] = ray.observed;
   }
   return seen;

@@ -20,7 +20,7 @@ std::optional<Continuation> ContinueLumen(const TrainingFrames& frames, const Fi
   RayBatch<float> batch;
   batch.rays.resize(kRays);
   const uint64_t key = RandomBits(seed, 0x626568696e64ull);
-  for (int r = 0; r < kRays; ++r) frames.Draw(RandomBits(key, r), origin, &batch.rays[r]);
+  frames.Draw(key, 0, origin, &batch.rays);
   Field<float>::SurfacePass pass;
   pass.positions = MeetSurface(field, parameters, sampling, key, &batch);
   field.Surface(parameters, &pass);

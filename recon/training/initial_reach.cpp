@@ -92,9 +92,7 @@ double FitReach(const TrainingFrames& frames, const InitialSurfaceOptions& initi
   std::vector<FrameLight<float>> lights;
   for (const Pose& pose : poses) lights.push_back(LightOfFrame<float>(frames.light(), pose, origin));
   std::vector<Ray> rays(kRays);
-  for (int r = 0; r < kRays; ++r) {
-    frames.Draw(RandomBits(seed, static_cast<uint64_t>(r)), origin, &rays[r]);
-  }
+  frames.Draw(seed, 0, origin, &rays);
   std::vector<double> reaches;
   for (double reach = initial.radius_mm / 2; reach <= farthest_mm; reach *= kStep) reaches.push_back(reach);
   std::vector<double> deviations(reaches.size());

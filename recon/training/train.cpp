@@ -236,7 +236,7 @@ class Run {
     RayBatch<float> batch;
     batch.rays.resize(kLookRays);
     const uint64_t key = RandomBits(run_.seed, 0x6c6f6f6bull);
-    for (int r = 0; r < kLookRays; ++r) frames_.Draw(RandomBits(key, r), trainer_.origin(), &batch.rays[r]);
+    frames_.Draw(key, 0, trainer_.origin(), &batch.rays);
     return batch;
   }
 

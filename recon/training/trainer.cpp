@@ -122,7 +122,7 @@ void Trainer::MatchColorsToInitialSurface(const InitialSurface& initial) {
   RayBatch<float> batch;
   batch.rays.resize(kRays);
   const uint64_t key = RandomBits(seed_, 0x636f6c6f7273ull);
-  for (int r = 0; r < kRays; ++r) frames_.Draw(RandomBits(key, r), origin_, &batch.rays[r]);
+  frames_.Draw(key, 0, origin_, &batch.rays);
   const Panel<float> positions = MeetSurface(*field_, Weights(), options_.sampling, key, &batch);
   Panel<float> value(1, TilesFor(kRays)), normal(3, TilesFor(kRays));
   for (int tile = 0; tile < positions.tiles(); ++tile) {
@@ -264,14 +264,9 @@ void Trainer::RunChunk(int index, const float* weights, const LossSettings<float
   chunk.terms = {};
   for (int begin = 0; begin < chunk.rays; begin += piece) {
     batch.rays.resize(std::min(piece, chunk.rays - begin));
-    const auto draw = [&](size_t r) {
-      return RandomBits(step_key, static_cast<uint64_t>(index) * kChunkRays + begin + r);
-    };
-    for (size_t r = 0; r < batch.rays.size(); ++r) frames_.Prefetch(draw(r));
-    for (size_t r = 0; r < batch.rays.size(); ++r) {
-      frames_.Draw(draw(r), origin_, &batch.rays[r]);
-      if (refines_poses()) Move(state_.poses, &batch.rays[r]);
-    }
+    frames_.Draw(step_key, static_cast<uint64_t>(index) * kChunkRays + begin, origin_, &batch.rays);
+    if (refines_poses())
+      for (auto& ray : batch.rays) Move(state_.poses, &ray);
     Lap(clock, Phase::kRays);
     workspace->sampler->Place(weights, options_.sampling, settings.sharpness,
                               RandomBits(step_key, static_cast<uint64_t>(index), 1 + begin), &batch);

@@ -56,11 +56,9 @@ class TrainingFrames {
   // (or at the frame's own gain, where that is unknown). Saturated pixels count as full scale.
   Vec3d MeanRadiance(int frame) const;
 
-  // Fills the pixel's part of a ray: direction and origin relative to `origin`, frame, exposure, floor,
-  // observed value and its bounds. `draw`: 64 random bits that choose frame and pixel, uniformly.
-  void Draw(uint64_t draw, const Vec3d& origin, RayBatch<float>::Ray* ray) const;
-  // Before a number of draws, so that they don't wait for memory one by one.
-  void Prefetch(uint64_t draw) const;
+  // Fills the pixels' part of rays: direction and origin relative to `origin`, frame, exposure, floor,
+  // observed value and its bounds. Frame and pixel of ray r are chosen, uniformly, by (key, first + r).
+  void Draw(uint64_t key, uint64_t first, const Vec3d& origin, std::vector<RayBatch<float>::Ray>* rays) const;
 
  private:
   struct Frame {
@@ -68,6 +66,12 @@ class TrainingFrames {
     double gain;               // 1 where unknown
     double log_gain_reach;
   };
+  struct Place {
+    size_t frame, pixel;
+  };
+  Place PlaceOf(uint64_t draw) const;
+  void Prefetch(const Place& place) const;
+  void Fill(const Place& place, const Vec3d& origin, RayBatch<float>::Ray* ray) const;
   double Normaliser(size_t pixel) const;  // vignetting · L_e
   // Fills what there is one of a pixel; their places in the image, ascending.
   std::vector<uint32_t> FindPixels(const Calibration& calibration, size_t most);
@@ -79,11 +83,6 @@ class TrainingFrames {
   bool lit_;
   bool gains_known_ = true;
   double hue_slope_ = 0;
-  struct Place {
-    size_t frame, pixel;
-  };
-  Place PlaceOf(uint64_t draw) const;
-
   std::vector<int> numbers_;
   std::vector<Pose> poses_;
   std::vector<Frame> frames_;
