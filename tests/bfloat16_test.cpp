@@ -182,9 +182,8 @@ double Worst(const std::vector<float>& results, const std::vector<Sum>& sums, do
 
 constexpr struct {
   int outputs, inputs, tiles;
-} kShapes[] = {{1, 1, 1},   {3, 19, 2}, {5, 7, 1},  {16, 3, 1}, {7, 16, 2},
-               {13, 33, 1}, {6, 64, 1}, {9, 67, 2}, {2, 129, 1}, {32, 64, 1},
-               {35, 70, 2}};
+} kShapes[] = {{1, 1, 1},  {3, 19, 2}, {5, 7, 1},   {16, 3, 1},  {7, 16, 2}, {13, 33, 1},
+               {6, 64, 1}, {9, 67, 2}, {2, 129, 1}, {32, 64, 1}, {35, 70, 2}};
 
 double Exact(float value) { return value; }
 

@@ -301,13 +301,13 @@ void OpacityBackward(State& state) {
   for (int r = 0; r < Rays::kRays; ++r) {
     const int at = r * Rays::kPerRay;
     RayWeights(Rays::kPerRay, &rays.distance[at], 2.0f, &rays.occupancy[at], &rays.transmittance[at],
-                 &rays.weight[at]);
+               &rays.weight[at]);
   }
   for (auto _ : state) {
     for (int r = 0; r < Rays::kRays; ++r) {
       const int at = r * Rays::kPerRay;
-      RayWeightsBackward(Rays::kPerRay, &rays.distance[at], 2.0f, &rays.occupancy[at], &rays.transmittance[at],
-                         &rays.weight_delta[at], &rays.distance_delta[at]);
+      RayWeightsBackward(Rays::kPerRay, &rays.distance[at], 2.0f, &rays.occupancy[at],
+                         &rays.transmittance[at], &rays.weight_delta[at], &rays.distance_delta[at]);
     }
     benchmark::ClobberMemory();
   }

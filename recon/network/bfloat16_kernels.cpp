@@ -37,8 +37,8 @@ const Bfloat16Kernels* Avx512Bfloat16Kernels() {
 
 const Bfloat16Kernels* AmxBfloat16Kernels() {
 #ifdef __x86_64__
-  static const bool here = Avx512Bfloat16Kernels() && __builtin_cpu_supports("amx-tile") &&
-                           __builtin_cpu_supports("amx-bf16");
+  static const bool here =
+      Avx512Bfloat16Kernels() && __builtin_cpu_supports("amx-tile") && __builtin_cpu_supports("amx-bf16");
   if (!here) return nullptr;
   // No machine that this was written on has them, so they are tried before they are used.
   static const Bfloat16Kernels* const permitted = PermittedAmxBfloat16Kernels();

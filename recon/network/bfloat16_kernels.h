@@ -4,9 +4,9 @@
 // at once, twice the work of a multiply-add in float; AMX's TDPBF16PS multiplies tiles of 16 × 16 pairs.
 //
 // Factors are rounded to nearest, ties to even: off by at most 2⁻⁸ of themselves. A product of two has 16
-// bits and is exact in float, so what the sums are off by beyond that is float's rounding. AVX512-BF16 and AMX
-// take numbers below the normal ones, 2⁻¹²⁶, for 0, as factors and as sums; the portable kernels keep them.
-// The order of the additions, and whether there is a rounding between a pair's two, is the processor's.
+// bits and is exact in float, so what the sums are off by beyond that is float's rounding. AVX512-BF16 and
+// AMX take numbers below the normal ones, 2⁻¹²⁶, for 0, as factors and as sums; the portable kernels keep
+// them. The order of the additions, and whether there is a rounding between a pair's two, is the processor's.
 #pragma once
 
 #include <cstddef>

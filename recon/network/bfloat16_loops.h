@@ -162,7 +162,8 @@ struct Bfloat16Loops {
 
 // Of bfloat16_avx512.cpp; null where it is compiled without these instructions.
 extern const Bfloat16Kernels* const kAvx512Bfloat16Kernels;
-// Of bfloat16_amx.cpp, for a processor that has them; null there likewise, or where the system doesn't permit.
+// Of bfloat16_amx.cpp, for a processor that has them; null there likewise, or where the system doesn't
+// permit.
 const Bfloat16Kernels* PermittedAmxBfloat16Kernels();
 
 }  // namespace lumen

@@ -1,5 +1,5 @@
-// Products of Bfloat16Kernels by tiles, sixteen rows of sixteen 32-bit numbers each, as AMX has them. Tiles is
-// eight of them, of the calling thread:
+// Products of Bfloat16Kernels by tiles, sixteen rows of sixteen 32-bit numbers each, as AMX has them. Tiles
+// is eight of them, of the calling thread:
 //   Prepare()                 before any other
 //   Load<t>(from, stride)     row r of t from `from` + r · stride, in 32-bit numbers
 //   Store<t>(to, stride)      and back

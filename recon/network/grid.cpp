@@ -109,9 +109,9 @@ void Grid<T>::Locate(const Level& level, const T* positions, Cell* cell) const {
   }
 }
 
-// kRun entries that lie side by side are moved as one: gather instructions fetch their numbers one by one, and
-// are slow on processors that guard them against speculation. A dense level has both ends of each of a cell's
-// edges along x side by side.
+// kRun entries that lie side by side are moved as one: gather instructions fetch their numbers one by one,
+// and are slow on processors that guard them against speculation. A dense level has both ends of each of a
+// cell's edges along x side by side.
 template <class T>
 template <int kRun>
 void Grid<T>::FetchRuns(const T* table, const Cell& cell, Corners* corners) {

@@ -15,11 +15,10 @@ struct ExtractOptions {
 };
 
 // Marching tetrahedra (six to a cube, so that the mesh is a closed manifold by construction) on a lattice
-// over the field's box; only blocks that the surface passes through are looked at. Keeps the component that
-// most rays from the places inside meet first; where none is given or meets any, the one that encloses the
-// largest volume: that can be a blob beyond the wall, where nothing holds the field. Vertices in world mm
-// (`origin` is the field's), faces oriented away from the lumen. Empty where the field has no surface. Throws
-// InputError where the field is not finite.
+// over the field's box; only blocks that the surface passes through are looked at. Keeps the wall around the
+// places inside (recon/surface/wall_around.h): beyond it, where nothing holds the field, it can have blobs.
+// Vertices in world mm (`origin` is the field's), faces oriented away from the lumen. Empty where the field
+// has no surface. Throws InputError where the field is not finite.
 Mesh ExtractMesh(const Field<float>& field, const float* parameters, const Vec3d& origin,
                  const ExtractOptions& options);
 

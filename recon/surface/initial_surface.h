@@ -17,8 +17,9 @@ struct InitialSurfaceOptions {
   // Of the tube; how far around the cameras the sphere reaches at least. Less than a lumen's: a wall that
   // moves outwards finds what folds hide, one that starts behind them leaves sheets.
   double radius_mm = 14;
-  double reach_mm = 55;   // how far a tube goes on in each camera's viewing direction
-  bool fit_reach = true;  // in place of reach_mm what fits the frames' brightness best, where light is modelled
+  double reach_mm = 55;  // how far a tube goes on in each camera's viewing direction
+  bool fit_reach =
+      true;  // in place of reach_mm what fits the frames' brightness best, where light is modelled
 };
 
 // radius − distance to the nearest of a set of segments.

@@ -45,7 +45,7 @@ void RayWeightsBackward(int n, const T* signed_distance, T sharpness, const T* o
   }
 }
 
-#define LUMEN_INSTANTIATE(T)                             \
+#define LUMEN_INSTANTIATE(T)                                 \
   template void RayWeights<T>(int, const T*, T, T*, T*, T*); \
   template void RayWeightsBackward<T>(int, const T*, T, const T*, const T*, const T*, T*);
 LUMEN_INSTANTIATE(float)

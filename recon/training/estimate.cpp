@@ -38,8 +38,8 @@ TrainEstimate EstimateTraining(const Sequence& sequence, const TrainOptions& opt
   result.samples_per_iteration = int64_t(options.sampling.rays) * options.sampling.PerRay();
   result.state_bytes = 4 * result.parameters * static_cast<int64_t>(sizeof(float));
 
-  // A step's cost follows the schedule: where it is sharp, fewer samples of a ray count. These are spread over
-  // it evenly, however many there will be (multiples of the golden ratio, Weyl 1916).
+  // A step's cost follows the schedule: where it is sharp, fewer samples of a ray count. These are spread
+  // over it evenly, however many there will be (multiples of the golden ratio, Weyl 1916).
   const auto progress_at = [](size_t i) { return std::fmod(0.5 + 0.6180339887498949 * double(i), 1.0); };
   trainer.Step(progress_at(0));  // fills caches and workspaces
   trainer.MeasurePhases();

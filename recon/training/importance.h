@@ -26,7 +26,7 @@ class ImportanceSampler : public RaySampler {
   const Field<float>* field_;
   Field<float>::ValuePass pass_;
   std::vector<float> look_, weight_;
-  std::vector<int> all_;  // rays of the batch
+  std::vector<int> all_;                      // rays of the batch
   std::vector<std::vector<Sample>> samples_;  // a ray; by distance
 };
 

@@ -279,10 +279,11 @@ void RayLoss<T>::BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& 
   }
 }
 
-// Pulls the logarithms that a network puts out (of the albedo, of the ambient factor; a channel each) towards its mean over
-// the batch. The mean is the batch's own and moves with it, so the pull is on the spread alone and never on
-// the level: a pull to a fixed mean would hold the whole reconstruction at the scale at which it starts. It
-// acts on the output alone: a weight that depended on it would move the surface to where the output is mean.
+// Pulls the logarithms that a network puts out (of the albedo, of the ambient factor; a channel each) towards
+// its mean over the batch. The mean is the batch's own and moves with it, so the pull is on the spread alone
+// and never on the level: a pull to a fixed mean would hold the whole reconstruction at the scale at which it
+// starts. It acts on the output alone: a weight that depended on it would move the surface to where the
+// output is mean.
 template <class T>
 double RayLoss<T>::Pull(T strength, T width, const Panel<T>& output, Panel<T>* delta) {
   const size_t count = active_.size();

@@ -135,12 +135,12 @@ class RayLoss {
   std::vector<Vec3<T>> ambient_;         // a ray: the part of its radiance that the rest of the wall sends
   std::vector<Vec3<T>> radiance_delta_;  // a ray
   std::vector<Active> active_;
-  std::vector<T> length_;                   // an active sample: of the SDF's gradient
-  std::vector<Shading<T>> shading_;         // an active sample
-  std::vector<ByCoat<T>> by_coat_;          // likewise, if the field has_coat
-  Panel<T> sample_weight_;                  // its weight; 0 beyond the last
+  std::vector<T> length_;                    // an active sample: of the SDF's gradient
+  std::vector<Shading<T>> shading_;          // an active sample
+  std::vector<ByCoat<T>> by_coat_;           // likewise, if the field has_coat
+  Panel<T> sample_weight_;                   // its weight; 0 beyond the last
   Panel<T> pull_, pull_slope_, pull_share_;  // on three of its outputs
-  Panel<T> log_albedo_, log_albedo_slope_;  // of the colour network's outputs, if the field bounds_albedo
+  Panel<T> log_albedo_, log_albedo_slope_;   // of the colour network's outputs, if the field bounds_albedo
   // Of the gradient by poses:
   Panel<T> positions_delta_;
   LineVector<T> unused_gradient_;

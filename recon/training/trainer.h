@@ -86,7 +86,7 @@ class Trainer {
     std::vector<float> pose_gradient;  // empty where poses stay as they are given
     LossTerms terms;
     std::unique_ptr<PhaseClock> clock;  // null where phases aren't measured
-    bool finite = true;  // loss and gradient
+    bool finite = true;                 // loss and gradient
   };
   bool has_grid() const { return field_->grid_size() > 0; }
   std::unique_ptr<Workspace> TakeWorkspace(Chunk* chunk);
