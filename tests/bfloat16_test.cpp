@@ -236,6 +236,26 @@ TEST(Bfloat16, TinyFactorsAreOffByTheLeastNormalNumberAtMost) {
     EXPECT_LE(Worst(ResultsOf(*kernels, subject), SumsOf(subject, NearestBfloat16), &Sum::Rounding), 1);
 }
 
+// What is tried before AMX is used: right kernels pass, and none whose product or gradient is off by one
+// number.
+TEST(Bfloat16, TrialProductsTellRightFromWrong) {
+  for (const Bfloat16Kernels* kernels : AllKernels()) EXPECT_TRUE(MultipliesRight(*kernels));
+  Bfloat16Kernels wrong = ModelTileKernels();
+  wrong.multiply = [](const uint32_t* weight, size_t row_stride, size_t pair_stride, const float* bias,
+                      int rows, int pairs, const uint32_t* x, float* y) {
+    ModelTileKernels().multiply(weight, row_stride, pair_stride, bias, rows, pairs, x, y);
+    if (row_stride == 1) y[rows * kTile - 1] += 1;
+  };
+  EXPECT_FALSE(MultipliesRight(wrong));
+  wrong = ModelTileKernels();
+  wrong.accumulate_outer = [](const float* y, int outputs, const float* x, int inputs, int tiles,
+                              uint32_t* room, float* gradient) {
+    ModelTileKernels().accumulate_outer(y, outputs, x, inputs, tiles, room, gradient);
+    gradient[outputs * inputs - 1] += 1;
+  };
+  EXPECT_FALSE(MultipliesRight(wrong));
+}
+
 // Of every bit pattern of a pair's first number, at random those of the second.
 TEST(Bfloat16, Avx512RoundsAsThePortableKernelsDo) {
   if (!Avx512Bfloat16Kernels()) GTEST_SKIP() << "this processor has no AVX512-BF16";

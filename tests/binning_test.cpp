@@ -88,8 +88,8 @@ TEST(Binning, ASquareCarriesImageWhereAllOfItDoes) {
       EXPECT_EQ(*valid.Pixel(x, y), x == 3 && y == 1 ? 0 : *all.Pixel(x, y)) << x << " " << y;
   const TrainOptions options = ReadTrainOptions("fast", {"binning=3"});
   const size_t fine = TrainingFrames(SmallSequence(), 6, true).pixel_rays().size();
-  const size_t coarse = FramesFor(SmallSequence(), options).pixel_rays().size();
-  EXPECT_EQ(FramesFor(sequence, options).pixel_rays().size() + 1, coarse);
+  const size_t coarse = FramesFor(SmallSequence(), options, 0).pixel_rays().size();
+  EXPECT_EQ(FramesFor(sequence, options, 0).pixel_rays().size() + 1, coarse);
   EXPECT_NEAR(double(coarse), double(fine) / 9, 0.1 * double(fine) / 9);
 }
 

@@ -5,10 +5,14 @@
 
 #include <Eigen/Geometry>
 
+#include "common/files.h"
 #include "common/random.h"
+#include "recon/training/learnt_light.h"
 #include "recon/training/pose_noise.h"
+#include "recon/training/train.h"
 #include "recon/training/trainer.h"
 #include "tests/small_sequence.h"
+#include "tests/support.h"
 
 namespace lumen {
 namespace {
@@ -61,6 +65,36 @@ TEST(PoseNoise, HasTheRootMeanSquareThatItIsToldAndFollowsFromSeedAndFrame) {
   EXPECT_LT(mean.norm(), 4 * 0.5 / std::sqrt(4000.0));
   EXPECT_NEAR(std::sqrt(shift), 0.5, 0.5 * 4 * std::sqrt(2.0 / 3 / 4000) / 2);
   EXPECT_NEAR(std::sqrt(angle), 0.005, 0.005 * 4 * std::sqrt(2.0 / 3 / 4000) / 2);
+}
+
+// A run that disturbs its poses is one on a sequence whose poses are so disturbed; what it has learnt of the
+// light is looked at from there.
+TEST(PoseNoise, ARunMayStartFromDisturbedPoses) {
+  const ScratchFolder folder;
+  const Sequence& exact = test::SmallSequence();
+  Sequence noisy = exact;
+  constexpr uint64_t kSeed = 3;
+  AddPoseNoise({0.7, 0.01}, kSeed, &noisy);
+  const auto run_on = [&](const Sequence& sequence, const std::string& name,
+                          std::vector<std::string> settings) {
+    settings.insert(settings.end(), {"schedule.iterations=20", "sampling.rays=32", "extract.cell_mm=3"});
+    TrainRun run;
+    run.folder = folder / name;
+    run.seed = kSeed;
+    Train(sequence, ReadTrainOptions("fast", settings), run);
+    return ReadFile(run.folder / "mesh.ply");
+  };
+  const std::string disturbed =
+      run_on(exact, "disturbed", {"poses.disturb_mm=0.7", "poses.disturb_rad=0.01"});
+  EXPECT_EQ(disturbed, run_on(noisy, "noisy", {}));
+  EXPECT_NE(disturbed, run_on(exact, "exact", {}));
+  const LightFrame found = LearntLight(folder / "disturbed", exact).At(1, 7),
+                   expected = LearntLight(folder / "noisy", noisy).At(1, 7);
+  ASSERT_FALSE(found.distance_mm.data.empty());
+  for (size_t i = 0; i < found.distance_mm.data.size(); ++i) {
+    const float a = found.distance_mm.data[i], b = expected.distance_mm.data[i];
+    EXPECT_TRUE(a == b || (std::isnan(a) && std::isnan(b))) << i;
+  }
 }
 
 TEST(PoseRefinement, MotionsComeToPosesAndRaysAlike) {

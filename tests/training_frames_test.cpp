@@ -6,7 +6,6 @@
 #include <map>
 
 #include "common/files.h"
-#include "common/random.h"
 #include "tests/child_process.h"
 #include "tests/small_sequence.h"
 

@@ -3,7 +3,6 @@
 #include "recon/network/bfloat16_tiles.h"
 
 #if defined(__AMX_BF16__) && defined(__AVX512BF16__)
-#include <immintrin.h>
 #include <sys/syscall.h>
 #include <unistd.h>
 
@@ -17,11 +16,12 @@ struct AmxTiles {
     uint16_t row_bytes[16] = {64, 64, 64, 64, 64, 64, 64, 64};
     uint8_t rows[16] = {16, 16, 16, 16, 16, 16, 16, 16};
   };
+  // Once a thread: nothing else in the program uses tiles.
   static void Prepare() {
     thread_local bool prepared = false;
     if (prepared) return;
-    const Shapes shapes;
-    _tile_loadconfig(&shapes);
+    static constexpr Shapes kShapes;
+    asm volatile("ldtilecfg %0" : : "m"(kShapes));
     prepared = true;
   }
   // In assembly, as the compiler's own functions take a tile's number as text only.

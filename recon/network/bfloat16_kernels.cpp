@@ -1,28 +1,34 @@
 #include "recon/network/bfloat16_kernels.h"
 
-#include <algorithm>
+#include <array>
+#include <vector>
 
 #include "recon/network/bfloat16_arithmetic.h"
 
 namespace lumen {
 
-namespace {
-
-// Whether whole numbers, whose sums are exact in any order, have the products that they must.
 bool MultipliesRight(const Bfloat16Kernels& kernels) {
-  constexpr int kRows = 19, kPairs = 21;
-  uint32_t weight[kRows * kPairs];
-  alignas(64) uint32_t x[kPairs * kTile];
-  alignas(64) float found[kRows * kTile], expected[kRows * kTile];
-  const auto pair = [](int i) { return Bfloat16Of(float(i % 13 - 6)) | Bfloat16Of(float(i % 7 - 3)) << 16; };
-  for (int i = 0; i < kRows * kPairs; ++i) weight[i] = pair(i);
-  for (int i = 0; i < kPairs * kTile; ++i) x[i] = pair(5 * i + i / kTile);
-  kernels.multiply(weight, kPairs, 1, nullptr, kRows, kPairs, x, found);
-  PortableBfloat16Kernels().multiply(weight, kPairs, 1, nullptr, kRows, kPairs, x, expected);
-  return std::equal(found, found + kRows * kTile, expected);
+  constexpr int kRows = 19, kPairs = 21, kInputs = 35;
+  std::vector<uint32_t> weight(kRows * kPairs), room(kRows * PairsFor(kTile));
+  LineVector<uint32_t> x(kPairs * kTile);
+  LineVector<float> left(kRows * kTile), right(kInputs * kTile);
+  std::vector<float> bias(kRows);
+  const auto whole = [](size_t i, int modulus) { return static_cast<float>(int(i) % modulus - modulus / 2); };
+  const auto pair = [&](size_t i) { return Bfloat16Of(whole(i, 13)) | Bfloat16Of(whole(i, 7)) << 16; };
+  for (size_t i = 0; i < weight.size(); ++i) weight[i] = pair(i);
+  for (size_t i = 0; i < x.size(); ++i) x[i] = pair(5 * i + i / kTile);
+  for (size_t i = 0; i < left.size(); ++i) left[i] = whole(i, 11);
+  for (size_t i = 0; i < right.size(); ++i) right[i] = whole(3 * i, 17);
+  for (int r = 0; r < kRows; ++r) bias[r] = whole(r, 5);
+  const auto results = [&](const Bfloat16Kernels& by) {
+    LineVector<float> straight(kRows * kTile), turned(kRows * kTile), outer(kRows * kInputs, 1.0f);
+    by.multiply(weight.data(), kPairs, 1, bias.data(), kRows, kPairs, x.data(), straight.data());
+    by.multiply(weight.data(), 1, kRows, nullptr, kRows, kPairs, x.data(), turned.data());
+    by.accumulate_outer(left.data(), kRows, right.data(), kInputs, 1, room.data(), outer.data());
+    return std::array{straight, turned, outer};
+  };
+  return results(kernels) == results(PortableBfloat16Kernels());
 }
-
-}  // namespace
 
 const Bfloat16Kernels& PortableBfloat16Kernels() { return Bfloat16Loops<PortableArithmetic>::kKernels; }
 

@@ -34,9 +34,13 @@ struct Bfloat16Kernels {
                            float* gradient);
 };
 
+// Whether products of whole numbers, whose sums are exact in any order, are what they must be.
+bool MultipliesRight(const Bfloat16Kernels& kernels);
+
 const Bfloat16Kernels& PortableBfloat16Kernels();
 // Null where the processor, or what this was compiled with, doesn't have these instructions.
 const Bfloat16Kernels* Avx512Bfloat16Kernels();
+// Nor where the system doesn't permit them or trial products are wrong.
 const Bfloat16Kernels* AmxBfloat16Kernels();
 const Bfloat16Kernels& FastestBfloat16Kernels();
 

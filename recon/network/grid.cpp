@@ -89,7 +89,7 @@ void Grid<T>::Locate(const Level& level, const T* positions, Cell* cell) const {
   }
   // What the lower and the upper corner along an axis bring to the place of an entry.
   alignas(64) uint32_t part[3][2][kTile];
-  const uint32_t row = level.corners[0], slice = level.corners[0] * level.corners[1];
+  const uint32_t row = level.corners[0], slice = row * static_cast<uint32_t>(level.corners[1]);
   // The primes of Müller et al.
   const uint32_t factor[3] = {1, level.dense ? row : 2654435761u, level.dense ? slice : 805459861u};
   for (int d = 0; d < 3; ++d) {

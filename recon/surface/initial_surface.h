@@ -18,8 +18,8 @@ struct InitialSurfaceOptions {
   // moves outwards finds what folds hide, one that starts behind them leaves sheets.
   double radius_mm = 14;
   double reach_mm = 55;  // how far a tube goes on in each camera's viewing direction
-  bool fit_reach =
-      true;  // in place of reach_mm what fits the frames' brightness best, where light is modelled
+  // In place of reach_mm what fits the frames' brightness best, where light is modelled.
+  bool fit_reach = true;
 };
 
 // radius − distance to the nearest of a set of segments.

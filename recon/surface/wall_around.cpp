@@ -1,5 +1,6 @@
 #include "recon/surface/wall_around.h"
 
+#include <cmath>
 #include <limits>
 #include <map>
 #include <numeric>

@@ -2,10 +2,10 @@
 
 #include <unistd.h>
 
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <fstream>
+#include <numeric>
 #include <vector>
 
 #include "recon/training/trainer.h"
@@ -29,7 +29,7 @@ int64_t ResidentBytes() {
 
 TrainEstimate EstimateTraining(const Sequence& sequence, const TrainOptions& options,
                                const EstimateOptions& estimate) {
-  const TrainingFrames frames = FramesFor(sequence, options);
+  const TrainingFrames frames = FramesFor(sequence, options, estimate.seed);
   Trainer trainer(frames, options, estimate.seed);
   TrainEstimate result;
   result.parameters = static_cast<int64_t>(trainer.state().parameters.size());
@@ -38,8 +38,9 @@ TrainEstimate EstimateTraining(const Sequence& sequence, const TrainOptions& opt
   result.samples_per_iteration = int64_t(options.sampling.rays) * options.sampling.PerRay();
   result.state_bytes = 4 * result.parameters * static_cast<int64_t>(sizeof(float));
 
-  // A step's cost follows the schedule: where it is sharp, fewer samples of a ray count. These are spread
-  // over it evenly, however many there will be (multiples of the golden ratio, Weyl 1916).
+  // Where sharpness is scheduled a step's cost follows it: the sharper, the fewer samples of a ray count.
+  // These are spread over the schedule evenly, however many there will be (multiples of the golden ratio,
+  // Weyl 1916), on a field that has hardly been trained.
   const auto progress_at = [](size_t i) { return std::fmod(0.5 + 0.6180339887498949 * double(i), 1.0); };
   trainer.Step(progress_at(0));  // fills caches and workspaces
   trainer.MeasurePhases();
@@ -55,8 +56,8 @@ TrainEstimate EstimateTraining(const Sequence& sequence, const TrainOptions& opt
   for (double& phase : result.phase_seconds) phase /= static_cast<double>(seconds.size());
   result.resident_bytes = ResidentBytes();
   result.measured_iterations = static_cast<int64_t>(seconds.size());
-  std::ranges::sort(seconds);
-  result.seconds_per_iteration = (seconds[(seconds.size() - 1) / 2] + seconds[seconds.size() / 2]) / 2;
+  result.seconds_per_iteration =
+      std::accumulate(seconds.begin(), seconds.end(), 0.0) / static_cast<double>(seconds.size());
   if (options.schedule.seconds > 0) {
     result.seconds = options.schedule.seconds;
     result.iterations = static_cast<int64_t>(result.seconds / result.seconds_per_iteration);

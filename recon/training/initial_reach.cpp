@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "common/parallel.h"
-#include "common/random.h"
 #include "recon/surface/shading.h"
 
 namespace lumen {

@@ -38,7 +38,7 @@ struct LearntLight::State {
   State(const std::filesystem::path& run, const Sequence& sequence)
       : options(OptionsOf(run)),
         indices(UniformFrames(static_cast<int>(sequence.frames.size()), options.train.frames)),
-        frames(FramesFor(sequence, options.train)),
+        frames(FramesFor(sequence, options.train, options.seed)),
         trainer(frames, options.train, options.seed),
         camera(sequence.calibration.camera),
         valid(ValidPixels(sequence.calibration)) {

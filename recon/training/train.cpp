@@ -21,7 +21,6 @@
 #include "recon/training/checkpoint.h"
 #include "recon/training/continue_lumen.h"
 #include "recon/training/plausible.h"
-#include "recon/training/pose_noise.h"
 #include "recon/training/trainer.h"
 
 namespace lumen {
@@ -66,7 +65,7 @@ class Run {
   Run(const Sequence& sequence, const TrainOptions& options, const TrainRun& run)
       : options_(ForFrames(options, std::min(options.frames, static_cast<int>(sequence.frames.size())))),
         run_(run),
-        frames_(FramesFor(sequence, options)),
+        frames_(FramesFor(sequence, options, run.seed)),
         trainer_(frames_, options_, run.seed),
         settings_("seed = " + std::to_string(run.seed) + "\n" + FormatTrainOptions(options_)) {}
 
@@ -322,11 +321,7 @@ std::filesystem::path MeshAtFile(const std::filesystem::path& folder, double par
 }
 
 TrainResult Train(const Sequence& sequence, const TrainOptions& options, const TrainRun& run) {
-  const auto& poses = options.poses;
-  if (poses.disturb_mm == 0 && poses.disturb_rad == 0) return Run(sequence, options, run).Go();
-  Sequence disturbed = sequence;
-  AddPoseNoise({poses.disturb_mm, poses.disturb_rad}, run.seed, &disturbed);
-  return Run(disturbed, options, run).Go();
+  return Run(sequence, options, run).Go();
 }
 
 }  // namespace lumen

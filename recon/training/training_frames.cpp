@@ -11,6 +11,7 @@
 #include "common/random.h"
 #include "recon/training/hue_slope.h"
 #include "recon/training/plausible.h"
+#include "recon/training/pose_noise.h"
 
 namespace lumen {
 namespace {
@@ -239,11 +240,15 @@ void TrainingFrames::Fill(const Place& place, const Vec3d& origin, RayBatch<floa
   }
 }
 
-TrainingFrames FramesFor(const Sequence& sequence, const TrainOptions& options) {
+TrainingFrames FramesFor(const Sequence& given, const TrainOptions& options, uint64_t seed) {
   const bool lit = options.field.reflectance != Reflectance::kUnlit;
-  // What isn't binned isn't copied: a mask may be large.
-  return options.binning == 1 ? TrainingFrames(sequence, options.frames, lit)
-                              : TrainingFrames(Binned(sequence, options.binning), options.frames, lit);
+  std::optional<Sequence> changed;  // what isn't changed isn't copied: a mask may be large
+  if (options.binning != 1) changed = Binned(given, options.binning);
+  if (options.poses.disturb_mm > 0 || options.poses.disturb_rad > 0) {
+    if (!changed) changed = given;
+    AddPoseNoise({options.poses.disturb_mm, options.poses.disturb_rad}, seed, &*changed);
+  }
+  return TrainingFrames(changed ? *changed : given, options.frames, lit);
 }
 
 }  // namespace lumen

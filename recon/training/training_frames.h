@@ -93,6 +93,6 @@ class TrainingFrames {
 };
 
 // The frames that a run with these options trains on.
-TrainingFrames FramesFor(const Sequence& sequence, const TrainOptions& options);
+TrainingFrames FramesFor(const Sequence& sequence, const TrainOptions& options, uint64_t seed);
 
 }  // namespace lumen
