@@ -231,7 +231,9 @@ TEST(Paper, ASmallOneLearnsAndEndsWithAClosedMesh) {
   }
   EXPECT_LT(last, 0.75 * first);
   EXPECT_GT(std::abs(std::log(sharpness / options.schedule.sharpness_start_per_mm)), 0.05);  // it is learnt
-  const Mesh mesh = ExtractMesh(trainer.field(), trainer.Weights(), trainer.origin(), {2});
+  ExtractOptions extract;
+  extract.cell_mm = 2;
+  const Mesh mesh = ExtractMesh(trainer.field(), trainer.Weights(), trainer.origin(), extract);
   EXPECT_TRUE(IsManifoldAndClosed(mesh));
   // It holds the lumen that the cameras were in.
   EXPECT_GT(test::Volume(mesh), 1e4);

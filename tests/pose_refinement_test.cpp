@@ -70,7 +70,7 @@ TEST(PoseNoise, HasTheRootMeanSquareThatItIsToldAndFollowsFromSeedAndFrame) {
 // A run that disturbs its poses is one on a sequence whose poses are so disturbed; what it has learnt of the
 // light is looked at from there.
 TEST(PoseNoise, ARunMayStartFromDisturbedPoses) {
-  const ScratchFolder folder;
+  const test::ScratchFolder folder;
   const Sequence& exact = test::SmallSequence();
   Sequence noisy = exact;
   constexpr uint64_t kSeed = 3;
