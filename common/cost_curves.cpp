@@ -73,7 +73,9 @@ Plot CostPlot(const CostCurves& curves, size_t measure, const std::string& x_lab
   for (const CostCurve& curve : curves.curves) {
     PlotSeries series;
     series.name = curve.knob;
-    series.color = PlotColor(plot.series.size() - 1);
+    const size_t index = plot.series.size() - 1;
+    series.color = PlotColor(index);
+    series.dashed = index >= kPlotColors;
     series.joined = true;
     for (const CostPoint& point : curve.points) {
       series.x.push_back(point.seconds);

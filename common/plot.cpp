@@ -278,15 +278,19 @@ Drawing DrawPlot(const Plot& plot, double width, double height) {
 }
 
 Rgb8 PlotColor(size_t index) {
-  // Paul Tol's "bright" scheme and two darker ones, told apart by the colour-blind.
-  static constexpr std::array<Rgb8, 8> kColors = {{{68, 119, 170},
-                                                   {238, 102, 119},
-                                                   {34, 136, 51},
-                                                   {204, 160, 40},
-                                                   {102, 190, 220},
-                                                   {170, 51, 119},
-                                                   {110, 110, 110},
-                                                   {120, 60, 20}}};
+  // Paul Tol's "bright" scheme and two darker ones, told apart by the colour-blind; and four more.
+  static constexpr std::array<Rgb8, kPlotColors> kColors = {{{68, 119, 170},
+                                                             {238, 102, 119},
+                                                             {34, 136, 51},
+                                                             {204, 160, 40},
+                                                             {102, 190, 220},
+                                                             {170, 51, 119},
+                                                             {110, 110, 110},
+                                                             {120, 60, 20},
+                                                             {235, 130, 50},
+                                                             {140, 110, 200},
+                                                             {0, 140, 140},
+                                                             {150, 160, 40}}};
   return kColors[index % kColors.size()];
 }
 

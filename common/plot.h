@@ -39,7 +39,8 @@ struct Plot {
 // the points, lines and each other; one that finds no place is left out.
 Drawing DrawPlot(const Plot& plot, double width, double height);
 
-// Distinct colours for the curves of a plot.
+// Distinct colours for the curves of a plot; they return after so many.
+inline constexpr size_t kPlotColors = 12;
 Rgb8 PlotColor(size_t index);
 
 }  // namespace lumen

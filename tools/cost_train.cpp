@@ -82,7 +82,7 @@ std::string Table(const std::vector<ConvergencePoint>& convergence) {
 }
 
 Drawing Page(const CostCurves& curves) {
-  constexpr double kWidth = 620, kHeight = 460;
+  constexpr double kWidth = 760, kHeight = 600;
   Drawing page{2 * kWidth, kHeight, {}};
   const char* const titles[] = {"Surveyed region", "Extended region"};
   for (size_t measure = 0; measure < 2; ++measure) {
