@@ -30,7 +30,7 @@ nlohmann::json Estimate(const Sequence& sequence, const TrainOptions& options, u
   fmt::print("memory         {:.0f} MB, of which {:.1f} MB parameters, gradient and moments; {} frames\n",
              static_cast<double>(estimate.resident_bytes) / kMegabyte,
              static_cast<double>(estimate.state_bytes) / kMegabyte, estimate.frames);
-  fmt::print("seconds        {:.4g} an iteration (mean of {})\n", estimate.seconds_per_iteration,
+  fmt::print("seconds        {:.4g} an iteration (median of {})\n", estimate.seconds_per_iteration,
              estimate.measured_iterations);
   fmt::print("goes on       ");
   nlohmann::json phases;

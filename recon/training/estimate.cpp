@@ -2,10 +2,10 @@
 
 #include <unistd.h>
 
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <fstream>
-#include <numeric>
 #include <vector>
 
 #include "recon/training/trainer.h"
@@ -39,25 +39,30 @@ TrainEstimate EstimateTraining(const Sequence& sequence, const TrainOptions& opt
   result.state_bytes = 4 * result.parameters * static_cast<int64_t>(sizeof(float));
 
   // Where sharpness is scheduled a step's cost follows it: the sharper, the fewer samples of a ray count.
-  // These are spread over the schedule evenly, however many there will be (multiples of the golden ratio,
-  // Weyl 1916), on a field that has hardly been trained.
-  const auto progress_at = [](size_t i) { return std::fmod(0.5 + 0.6180339887498949 * double(i), 1.0); };
-  trainer.Step(progress_at(0));  // fills caches and workspaces
+  // These steps are spread over the schedule evenly, however many there will be (multiples of the golden
+  // ratio, Weyl 1916), on a field that has hardly been trained.
+  const auto step = [&](size_t i) {
+    const double progress = std::fmod(0.5 + 0.6180339887498949 * double(i), 1.0);
+    trainer.state().iteration = std::llround(progress * double(options.schedule.iterations));
+    trainer.Step(progress);
+  };
+  step(0);  // fills caches and workspaces
   trainer.MeasurePhases();
   std::vector<double> seconds;
   const double start = Now();
   while (seconds.size() < 2 ||
          (Now() - start < estimate.seconds && static_cast<int64_t>(seconds.size()) < estimate.iterations)) {
     const double before = Now();
-    trainer.Step(progress_at(seconds.size()));
+    step(seconds.size());
     seconds.push_back(Now() - before);
   }
   result.phase_seconds = trainer.phase_seconds();
   for (double& phase : result.phase_seconds) phase /= static_cast<double>(seconds.size());
   result.resident_bytes = ResidentBytes();
   result.measured_iterations = static_cast<int64_t>(seconds.size());
-  result.seconds_per_iteration =
-      std::accumulate(seconds.begin(), seconds.end(), 0.0) / static_cast<double>(seconds.size());
+  // Some steps wait for what else the machine does.
+  std::ranges::sort(seconds);
+  result.seconds_per_iteration = (seconds[(seconds.size() - 1) / 2] + seconds[seconds.size() / 2]) / 2;
   if (options.schedule.seconds > 0) {
     result.seconds = options.schedule.seconds;
     result.iterations = static_cast<int64_t>(result.seconds / result.seconds_per_iteration);

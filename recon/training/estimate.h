@@ -17,8 +17,8 @@ struct TrainEstimate {
   int64_t state_bytes = 0;            // parameters, gradient and Adam's moments
   int64_t resident_bytes = 0;         // of the whole process after the measured iterations, frames included
   int64_t measured_iterations = 0;
-  double seconds_per_iteration = 0;  // their mean, wall time
-  PhaseSeconds phase_seconds = {};   // likewise, threads added up
+  double seconds_per_iteration = 0;  // their median, wall time
+  PhaseSeconds phase_seconds = {};   // an iteration's, their mean, threads added up
   int64_t iterations = 0;            // of the whole run
   double seconds = 0;
 };
@@ -29,7 +29,7 @@ struct EstimateOptions {
   uint64_t seed = 0;
 };
 
-// Writes no file. A run that ends by the clock is as long as that, its iterations follow from their mean.
+// Writes no file. A run that ends by the clock is as long as that, its iterations follow from their median.
 // Throws InputError as Train does, for what the sequence is at fault for.
 TrainEstimate EstimateTraining(const Sequence& sequence, const TrainOptions& options,
                                const EstimateOptions& estimate);

@@ -70,7 +70,6 @@ class TrainingFrames {
     size_t frame, pixel;
   };
   Place PlaceOf(uint64_t draw) const;
-  void Prefetch(const Place& place) const;
   void Fill(const Place& place, const Vec3d& origin, RayBatch<float>::Ray* ray) const;
   double Normaliser(size_t pixel) const;  // vignetting · L_e
   // Fills what there is one of a pixel; their places in the image, ascending.
