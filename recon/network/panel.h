@@ -54,6 +54,7 @@ class Panel {
   // A sample's column, samples counted through all tiles: its number in row r is [r * kTile].
   T* Column(size_t sample) { return Tile(static_cast<int>(sample / kTile)) + sample % kTile; }
   const T* Column(size_t sample) const { return Tile(static_cast<int>(sample / kTile)) + sample % kTile; }
+  // And one of its numbers.
   T& At(int row, int sample) { return Row(sample / kTile, row)[sample % kTile]; }
   T At(int row, int sample) const { return Row(sample / kTile, row)[sample % kTile]; }
 

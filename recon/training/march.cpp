@@ -34,27 +34,27 @@ void Marcher::FindCrossings(const float* parameters, const TrainOptions::Samplin
   far_.resize(rays);
   jitter_.resize(rays);
   crossings_.resize(rays);
-  open_.resize(rays);
+  along_.resize(rays);
   for (int r = 0; r < rays; ++r) {
     far_[r] = FarthestSample(field_->box(), batch.rays[r].origin, batch.rays[r].direction);
     jitter_[r] = UniformFloat(RandomBits(key, r, 0));
-    open_[r] = r;
+    along_[r] = r;
   }
-  for (int begin = 0; begin < options.coarse && !open_.empty(); begin += kLooksAtOnce) {
+  for (int begin = 0; begin < options.coarse && !along_.empty(); begin += kLooksAtOnce) {
     const int end = std::min(begin + kLooksAtOnce, options.coarse);
     look_.clear();
     for (int k = begin; k < end; ++k) {
-      for (int r : open_) {
+      for (int r : along_) {
         // Denser near the camera, where folds are seen thin; the last look-up is at the far end itself.
         const float u = k + 1 == options.coarse ? 1.0f : (k + jitter_[r]) / (options.coarse - 1);
         look_.push_back(kNearest_mm + (far_[r] - kNearest_mm) * u * std::sqrt(u));
       }
     }
-    LookAlongRays(*field_, parameters, batch, open_, look_, &pass_);
-    const size_t asked = open_.size();
+    LookAlongRays(*field_, parameters, batch, along_, look_, &pass_);
+    const size_t asked = along_.size();
     size_t still_open = 0;
     for (size_t i = 0; i < asked; ++i) {
-      Crossing& c = crossings_[open_[i]];
+      Crossing& c = crossings_[along_[i]];
       bool met = false;
       for (int k = begin; k < end && !met; ++k) {
         const size_t at = size_t(k - begin) * asked + i;
@@ -62,19 +62,19 @@ void Marcher::FindCrossings(const float* parameters, const TrainOptions::Samplin
         c = {k > 0 ? c.outside : look_[at], look_[at], k > 0 ? c.outside_value : value, value};
         met = !(value > 0);
       }
-      if (!met) open_[still_open++] = open_[i];
+      if (!met) along_[still_open++] = along_[i];
     }
-    open_.resize(still_open);
+    along_.resize(still_open);
   }
-  open_.resize(rays);
-  std::iota(open_.begin(), open_.end(), 0);
+  along_.resize(rays);
+  std::iota(along_.begin(), along_.end(), 0);
   look_.resize(rays);
   for (int step = 0; step < kSecantSteps; ++step) {
     for (int r = 0; r < rays; ++r) {
       const Crossing& c = crossings_[r];
       look_[r] = ZeroBetween(c.inside, c.outside, c.inside_value, c.outside_value);
     }
-    LookAlongRays(*field_, parameters, batch, open_, look_, &pass_);
+    LookAlongRays(*field_, parameters, batch, along_, look_, &pass_);
     for (int r = 0; r < rays; ++r) {
       Crossing& c = crossings_[r];
       const float value = pass_.value.At(0, r);

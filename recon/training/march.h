@@ -26,7 +26,7 @@ class Marcher : public RaySampler {
   const Field<float>* field_;
   Field<float>::ValuePass pass_;
   std::vector<float> look_, far_, jitter_, placed_;
-  std::vector<int> open_;  // rays that are looked along
+  std::vector<int> along_;  // rays that are looked along
   std::vector<Crossing> crossings_;
 };
 

@@ -96,7 +96,7 @@ void RayLoss<T>::ShadeActive(const T* parameters, const RayBatch<T>& batch,
     T* length = &length_[size_t(tile) * kTile];
     for (int s = 0; s < kTile; ++s) {
       const T x = gradient[s], y = gradient[kTile + s], z = gradient[2 * kTile + s];
-      length[s] = std::sqrt(x * x + (z * z + y * y));
+      length[s] = std::sqrt(x * x + (z * z + y * y));  // rounds as Eigen's norm
       const T divisor = length[s] > 0 ? length[s] : T(1);
       for (int d = 0; d < 3; ++d) normal[d * kTile + s] = gradient[d * kTile + s] / divisor;
     }
@@ -280,7 +280,7 @@ void RayLoss<T>::BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& 
 }
 
 // Pulls the logarithms that a network puts out (of the albedo, of the ambient factor; a channel each) towards
-// its mean over the batch. The mean is the batch's own and moves with it, so the pull is on the spread alone
+// their means over the batch. A mean is the batch's own and moves with it, so the pull is on the spread alone
 // and never on the level: a pull to a fixed mean would hold the whole reconstruction at the scale at which it
 // starts. It acts on the output alone: a weight that depended on it would move the surface to where the
 // output is mean.
