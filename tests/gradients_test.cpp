@@ -1,7 +1,9 @@
 // Every gradient of the reconstructor against central differences in double, second order included.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "recon/surface/volume.h"
 #include "recon/training/ray_loss.h"
@@ -163,6 +165,68 @@ TEST(Volume, GradientMatchesFiniteDifferences) {
   }
 }
 
+// A ray with a colour at each sample, both linear from sample to sample: cut into thousands of sections, on
+// which any rule agrees, it has the radiance that the linear weights give uncut, and the trapezoidal rule
+// doesn't.
+TEST(Volume, LinearWeightsIntegrateLinearColor) {
+  constexpr int kSamples = 9, kParts = 4000, kFine = (kSamples - 1) * kParts + 1;
+  uint64_t state = 31;
+  double farthest_trapezoid = 0;
+  for (double sharpness : {0.3, 2.0, 10.0}) {
+    double f[kSamples], color[kSamples], occupancy[kSamples], transmittance[kSamples], share[kSamples],
+        weight[kSamples];
+    for (int i = 0; i < kSamples; ++i) {
+      f[i] = 4 - i + 1.2 * Random(state);  // some sections rise
+      color[i] = Random(state);
+    }
+    LinearRayWeights(kSamples, f, sharpness, occupancy, transmittance, share, weight);
+    double found = 0, sum = 0, trapezoid = 0;
+    for (int i = 0; i < kSamples; ++i) {
+      found += weight[i] * color[i];
+      sum += weight[i];
+      EXPECT_GE(weight[i], 0);
+    }
+    EXPECT_NEAR(sum, 1, 1e-14);
+    RayWeights(kSamples, f, sharpness, occupancy, transmittance, weight);
+    for (int i = 0; i < kSamples; ++i) trapezoid += weight[i] * color[i];
+
+    std::vector<double> fine(kFine), fine_color(kFine), a(kFine), b(kFine), fine_weight(kFine);
+    for (int k = 0; k < kFine; ++k) {
+      const int i = std::min(k / kParts, kSamples - 2);
+      const double part = double(k - i * kParts) / kParts;
+      fine[k] = f[i] + part * (f[i + 1] - f[i]);
+      fine_color[k] = color[i] + part * (color[i + 1] - color[i]);
+    }
+    RayWeights(kFine, fine.data(), sharpness, a.data(), b.data(), fine_weight.data());
+    double expected = 0;
+    for (int k = 0; k < kFine; ++k) expected += fine_weight[k] * fine_color[k];
+    EXPECT_NEAR(found, expected, 1e-6) << sharpness;
+    farthest_trapezoid = std::max(farthest_trapezoid, std::abs(trapezoid - expected));
+  }
+  EXPECT_GT(farthest_trapezoid, 1e-2);
+}
+
+// Thick sections by the closed form, thin ones by the series, and both across the step between them.
+TEST(Volume, GradientOfLinearWeightsMatchesFiniteDifferences) {
+  uint64_t state = 29;
+  for (double sharpness : {0.05, 0.3, 0.41, 2.0, 10.0, 40.0}) {
+    double f[9], by_weight[9], occupancy[9], transmittance[9], share[9], weight[9], gradient[9];
+    for (int i = 0; i < 9; ++i) {
+      f[i] = 2 - 0.5 * i + 0.6 * Random(state);
+      by_weight[i] = Random(state);
+    }
+    auto loss = [&] {
+      LinearRayWeights(9, f, sharpness, occupancy, transmittance, share, weight);
+      double sum = 0;
+      for (int i = 0; i < 9; ++i) sum += weight[i] * by_weight[i];
+      return sum;
+    };
+    loss();
+    LinearRayWeightsBackward(9, f, sharpness, occupancy, transmittance, share, by_weight, gradient);
+    for (int i = 0; i < 9; ++i) EXPECT_NEAR(gradient[i], Difference(loss, &f[i]), 1e-7 * sharpness) << i;
+  }
+}
+
 TEST(Loss, TermsMatchFiniteDifferences) {
   const double floor = std::pow(0.5 / 255, 2.2);
   for (double x : {0.0, 0.5 * floor, 2 * floor, 1e-3, 0.4, 3.0}) {
@@ -234,11 +298,13 @@ struct LookOfWall {
   Interreflection interreflection;
   bool bounded = false;   // albedo, beside a power that is learnt
   bool as_paper = false;  // frequencies, softplus, a skip and the sphere that the network starts as
+  bool linear = false;    // weights that are exact for linear colours
 };
 // Without it a test's name would hold the bytes of the struct's padding.
 void PrintTo(const LookOfWall& look, std::ostream* out) {
   *out << "reflectance " << int(look.reflectance) << " interreflection " << int(look.interreflection)
-       << (look.bounded ? " bounded" : "") << (look.as_paper ? " as the paper's" : "");
+       << (look.bounded ? " bounded" : "") << (look.as_paper ? " as the paper's" : "")
+       << (look.linear ? " linear" : "");
 }
 
 // Of the first frame, with all channels exact.
@@ -298,7 +364,7 @@ TEST_P(RayLossGradient, MatchesFiniteDifferences) {
     batch.rays.push_back(RandomRay(state, Vec3d(0.3, 0.1, -0.2), 1.3, Vec3d(0.5, 0.4, 0.3)));
     for (int k = 0; k < 12; ++k) batch.distance.push_back(1 + 1.2 * k + 0.3 * Random(state));
   }
-  LossSettings<double> settings{0.9, 1 / 2.2, 0.1, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0 / 6};
+  LossSettings<double> settings{0.9, 1 / 2.2, 0.1, 0.0, 0.1, 0.0, 0.0, 0.0, 1.0 / 6, GetParam().linear};
 
   RayLoss<double> ray_loss(&field);
   std::vector<double> unused(field.network_size());
@@ -554,6 +620,7 @@ TEST(PoseGradient, FollowsTheNormalsOfALitWall) {
 INSTANTIATE_TEST_SUITE_P(
     Looks, RayLossGradient,
     testing::Values(LookOfWall{Reflectance::kLambertian, Interreflection::kNone},
+                    LookOfWall{Reflectance::kLambertian, Interreflection::kNone, false, false, true},
                     LookOfWall{Reflectance::kLambertian, Interreflection::kMean},
                     LookOfWall{Reflectance::kLambertian, Interreflection::kRadiosity},
                     LookOfWall{Reflectance::kLambertian, Interreflection::kRadiosity, true},

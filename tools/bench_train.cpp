@@ -269,11 +269,12 @@ BENCHMARK(FieldBackward)->Arg(0)->Arg(1);
 // 32 rays of 17 samples that fall through the surface.
 struct Rays {
   static constexpr int kRays = 32, kPerRay = 17;
-  std::vector<float> distance, occupancy, transmittance, weight, weight_delta, distance_delta;
+  std::vector<float> distance, occupancy, transmittance, near_share, weight, weight_delta, distance_delta;
   Rays()
       : distance(kRays * kPerRay),
         occupancy(distance.size()),
         transmittance(distance.size()),
+        near_share(distance.size()),
         weight(distance.size()),
         weight_delta(distance.size(), 0.3f),
         distance_delta(distance.size()) {
@@ -314,6 +315,40 @@ void OpacityBackward(State& state) {
   CountSamples(state, Rays::kRays * Rays::kPerRay);
 }
 BENCHMARK(OpacityBackward);
+
+void WeighLinearly(Rays* rays) {
+  for (int r = 0; r < Rays::kRays; ++r) {
+    const int at = r * Rays::kPerRay;
+    LinearRayWeights(Rays::kPerRay, &rays->distance[at], 2.0f, &rays->occupancy[at], &rays->transmittance[at],
+                     &rays->near_share[at], &rays->weight[at]);
+  }
+}
+
+void LinearOpacityForward(State& state) {
+  Rays rays;
+  for (auto _ : state) {
+    WeighLinearly(&rays);
+    benchmark::ClobberMemory();
+  }
+  CountSamples(state, Rays::kRays * Rays::kPerRay);
+}
+BENCHMARK(LinearOpacityForward);
+
+void LinearOpacityBackward(State& state) {
+  Rays rays;
+  WeighLinearly(&rays);
+  for (auto _ : state) {
+    for (int r = 0; r < Rays::kRays; ++r) {
+      const int at = r * Rays::kPerRay;
+      LinearRayWeightsBackward(Rays::kPerRay, &rays.distance[at], 2.0f, &rays.occupancy[at],
+                               &rays.transmittance[at], &rays.near_share[at], &rays.weight_delta[at],
+                               &rays.distance_delta[at]);
+    }
+    benchmark::ClobberMemory();
+  }
+  CountSamples(state, Rays::kRays * Rays::kPerRay);
+}
+BENCHMARK(LinearOpacityBackward);
 
 // A place under three guides off the axis; forward and backward are one.
 struct Lit {

@@ -29,9 +29,23 @@ T Sigmoid(T x) {
 template <class T>
 void RayWeights(int n, const T* signed_distance, T sharpness, T* occupancy, T* transmittance, T* weight);
 
+// The same but for how a section's opacity is shared between its ends: each gets what makes the sum over the
+// samples the ray's integral where signed distance and colour change linearly from sample to sample. With m
+// the mean over the section of Φ(s·f)/Φ(s·f₀), the nearer end has 1 − m and the farther m − Φ(s·f₁)/Φ(s·f₀);
+// m is (log(1 + e^(s·f₀)) − log(1 + e^(s·f₁)))/(s·(f₀ − f₁)·Φ(s·f₀)), as ∫Φ = log(1 + e^x). The trapezoidal
+// rule gives half of the faint front of a wall to the sample before it, however far in front that is: it
+// looks nearer, hence brighter. near_share: n numbers, 1 − m of the section after each sample.
+template <class T>
+void LinearRayWeights(int n, const T* signed_distance, T sharpness, T* occupancy, T* transmittance,
+                      T* near_share, T* weight);
+
 // The gradient: distance_delta[i] = ∂loss/∂signed_distance[i], given weight_delta[i] = ∂loss/∂weight[i].
 template <class T>
 void RayWeightsBackward(int n, const T* signed_distance, T sharpness, const T* occupancy,
                         const T* transmittance, const T* weight_delta, T* distance_delta);
+template <class T>
+void LinearRayWeightsBackward(int n, const T* signed_distance, T sharpness, const T* occupancy,
+                              const T* transmittance, const T* near_share, const T* weight_delta,
+                              T* distance_delta);
 
 }  // namespace lumen

@@ -67,6 +67,7 @@ learning_rate_final = 0.05
 decay = "cosine"
 warm_up = 0.016667
 adam_beta2 = 0.999
+settle_from = 0
 sharpness_start_per_mm = 0.294
 sharpness_rate = 10.0
 )";
@@ -195,6 +196,7 @@ void ReadRest(const ConfigTable& root, TrainOptions* options) {
     s.adam_beta2 = schedule->Number("adam_beta2", s.adam_beta2, {0, 0.999999});
     s.table_epsilon = schedule->Number("table_epsilon", s.table_epsilon, {kLeastAdamEpsilon, 1});
     s.table_epsilon_from = schedule->Integer("table_epsilon_from", s.table_epsilon_from, {0, 1e12});
+    s.settle_from = schedule->Integer("settle_from", s.settle_from, {0, 1e12});
     s.sharpness_rate = schedule->Number("sharpness_rate", s.sharpness_rate, kNotNegative);
     s.sharpness_start_per_mm =
         schedule->Number("sharpness_start_per_mm", s.sharpness_start_per_mm, kPositive);
@@ -330,7 +332,7 @@ std::string FormatTrainOptions(const TrainOptions& o) {
       << kDecayNames[int(o.schedule.decay)] << "\"\nwarm_up = " << o.schedule.warm_up
       << "\nadam_beta2 = " << o.schedule.adam_beta2 << "\ntable_epsilon = " << o.schedule.table_epsilon
       << "\ntable_epsilon_from = " << o.schedule.table_epsilon_from
-      << "\nsharpness_rate = " << o.schedule.sharpness_rate
+      << "\nsettle_from = " << o.schedule.settle_from << "\nsharpness_rate = " << o.schedule.sharpness_rate
       << "\nsharpness_start_per_mm = " << o.schedule.sharpness_start_per_mm
       << "\nsharpness_end_per_mm = " << o.schedule.sharpness_end_per_mm
       << "\nfog_per_mm = " << o.schedule.fog_per_mm << "\nfog_iterations = " << o.schedule.fog_iterations

@@ -47,9 +47,16 @@ void RayLoss<T>::FindWeights(const T* parameters, const RayBatch<T>& batch, cons
   transmittance_.resize(count);
   weight_.resize(count);
   for (int i = 0; i < count; ++i) signed_distance_[i] = value_.value.At(0, i);
+  if (settings.linear_sections) near_share_.resize(count);
   for (size_t r = 0; r < batch.rays.size(); ++r) {
-    RayWeights(n, &signed_distance_[r * n], settings.sharpness, &occupancy_[r * n], &transmittance_[r * n],
-               &weight_[r * n]);
+    const size_t at = r * n;
+    if (settings.linear_sections) {
+      LinearRayWeights(n, &signed_distance_[at], settings.sharpness, &occupancy_[at], &transmittance_[at],
+                       &near_share_[at], &weight_[at]);
+    } else {
+      RayWeights(n, &signed_distance_[at], settings.sharpness, &occupancy_[at], &transmittance_[at],
+                 &weight_[at]);
+    }
   }
 }
 
@@ -268,8 +275,15 @@ void RayLoss<T>::BackToSamples(const RayBatch<T>& batch, const LossSettings<T>& 
         Pull(strength, settings.albedo_width, surface_.ambient_output(), &surface_.ambient_delta);
   }
   for (size_t r = 0; r < batch.rays.size(); ++r) {
-    RayWeightsBackward(n, &signed_distance_[r * n], settings.sharpness, &occupancy_[r * n],
-                       &transmittance_[r * n], &weight_delta_[r * n], &distance_delta_[r * n]);
+    const size_t at = r * n;
+    if (settings.linear_sections) {
+      LinearRayWeightsBackward(n, &signed_distance_[at], settings.sharpness, &occupancy_[at],
+                               &transmittance_[at], &near_share_[at], &weight_delta_[at],
+                               &distance_delta_[at]);
+    } else {
+      RayWeightsBackward(n, &signed_distance_[at], settings.sharpness, &occupancy_[at], &transmittance_[at],
+                         &weight_delta_[at], &distance_delta_[at]);
+    }
   }
   // The weights depend on s · f only.
   for (size_t i = 0; i < distance_delta_.size(); ++i)

@@ -51,7 +51,8 @@ struct LossSettings {
   T ambient_doubt;   // of ChannelTrust
   // Samples whose weight and whose influence on any weight are below this are left out; 0 = none.
   T weight_threshold;
-  T per_ray;  // 1/number of rays of the whole step
+  T per_ray;                     // 1/number of rays of the whole step
+  bool linear_sections = false;  // weights are LinearRayWeights
 };
 
 // Sums over a batch; the first five are the parts of the step's loss.
@@ -131,7 +132,8 @@ class RayLoss {
   typename Field<T>::ValuePass value_;
   typename Field<T>::SurfacePass surface_;
   // Rays × samples.
-  std::vector<T> signed_distance_, occupancy_, transmittance_, weight_, weight_delta_, distance_delta_;
+  std::vector<T> signed_distance_, occupancy_, transmittance_, near_share_, weight_, weight_delta_,
+      distance_delta_;
   std::vector<Vec3<T>> ambient_;         // a ray: the part of its radiance that the rest of the wall sends
   std::vector<Vec3<T>> radiance_delta_;  // a ray
   std::vector<Active> active_;

@@ -25,6 +25,8 @@ constexpr int64_t kSurroundingsEvery = 250;  // iterations
 
 constexpr size_t kCamerasAStep = 2 * kTile;  // that are kept in the lumen
 
+constexpr int kSettledLooks = 2;  // times as many look-ups find the surface of a run that settles
+
 constexpr double kLongestFog = 0.2;  // as a part of the run: a short one, too, is to end with a wall
 
 // In lanes, so that no addition waits for the one before.
@@ -176,9 +178,15 @@ const float* Trainer::Weights() {
   return weights_.data();
 }
 
+double Trainer::Settling() const {
+  const int64_t from = options_.schedule.settle_from;
+  return from > 0 ? static_cast<double>(state_.iteration) / static_cast<double>(from) : 0.0;
+}
+
 double Trainer::SharpnessAt(double progress) const {
   const auto& schedule = options_.schedule;
-  const double set = LogInterpolate(schedule.sharpness_start_per_mm, schedule.sharpness_end_per_mm, progress);
+  const double grown = std::max(progress, std::min(1.0, Settling()));
+  const double set = LogInterpolate(schedule.sharpness_start_per_mm, schedule.sharpness_end_per_mm, grown);
   if (schedule.fog_iterations == 0) return set;
   const double lifted =
       std::max(static_cast<double>(state_.iteration) / static_cast<double>(schedule.fog_iterations),
@@ -203,12 +211,14 @@ LossSettings<float> Trainer::SettingsAt(double progress) const {
   settings.ambient_doubt = static_cast<float>(options_.loss.ambient_doubt);
   settings.weight_threshold = static_cast<float>(options_.sampling.weight_threshold);
   settings.per_ray = 1.0f / static_cast<float>(options_.sampling.rays);
+  settings.linear_sections = settles();
   return settings;
 }
 
 double Trainer::RateAt(double progress) const {
   const auto& schedule = options_.schedule;
-  const double start = schedule.learning_rate, end = start * schedule.learning_rate_final;
+  const double start = schedule.learning_rate / (settles() ? std::sqrt(Settling()) : 1.0);
+  const double end = start * schedule.learning_rate_final;
   if (progress < schedule.warm_up) return start * progress / schedule.warm_up;
   const double at = (progress - schedule.warm_up) / (1 - schedule.warm_up);
   if (schedule.decay == Decay::kCosine) return end + (start - end) * (1 + std::cos(kPi * at)) / 2;
@@ -261,6 +271,8 @@ void Trainer::RunChunk(int index, const float* weights, const LossSettings<float
   if (clock) clock->Start();
   const uint64_t step_key = RandomBits(seed_, 0x7261797300ull, static_cast<uint64_t>(state_.iteration));
   const int piece = has_grid() ? chunk.rays : kPieceRays;
+  TrainOptions::Sampling sampling = options_.sampling;
+  if (settles()) sampling.coarse *= kSettledLooks;
   chunk.terms = {};
   for (int begin = 0; begin < chunk.rays; begin += piece) {
     batch.rays.resize(std::min(piece, chunk.rays - begin));
@@ -268,7 +280,7 @@ void Trainer::RunChunk(int index, const float* weights, const LossSettings<float
     if (refines_poses())
       for (auto& ray : batch.rays) Move(state_.poses, &ray);
     Lap(clock, Phase::kRays);
-    workspace->sampler->Place(weights, options_.sampling, settings.sharpness,
+    workspace->sampler->Place(weights, sampling, settings.sharpness,
                               RandomBits(step_key, static_cast<uint64_t>(index), 1 + begin), &batch);
     Lap(clock, Phase::kPlaces);
     chunk.terms += workspace->loss.Evaluate(
