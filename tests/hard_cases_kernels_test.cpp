@@ -103,8 +103,9 @@ TEST(HardCasesTraining, WeightsOfAMillionRaysAreThoseOfDouble) {
 }
 
 // Of the linear weights a section's near share is off, beside the error of what it is made of, by the step
-// between series and closed form, which float and double may take on either side, Δ³/720 at Δ = 0.2; the
-// closed form divides its errors by ΔΦ ≥ 0.1, and its derivative by Δ ≥ 0.2 once more.
+// between series and closed form, which float and double may take on either side: Δ³/720 at Δ = 0.2, of what
+// the section takes. The closed form divides its terms by ΔΦ, which is 0.1 or more in the lumen and small
+// only where the terms are as small; its derivative divides by Δ ≥ 0.2 once more.
 TEST(HardCasesTraining, LinearWeightsOfAMillionRaysAreThoseOfDouble) {
   constexpr double kStep = 0.2 * 0.2 * 0.2 / 720;
   uint64_t state = 5;

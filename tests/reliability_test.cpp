@@ -23,12 +23,10 @@ using test::StartLumen;
 namespace fs = std::filesystem;
 
 // A checkpoint after every step, small; it holds the light that the wall sends itself, found at the first.
-const std::vector<std::string> kSettings = {"schedule.iterations=60",
-                                            "sampling.rays=64",
-                                            "extract.cell_mm=4",
-                                            "schedule.checkpoint_seconds=0",
-                                            "network.interreflection=\"radiosity\"",
-                                            "grid.log2_table_size=10"};
+const std::vector<std::string> kSettings = {
+    "schedule.iterations=60", "schedule.settle_from=30",       "sampling.rays=64",
+    "extract.cell_mm=4",      "schedule.checkpoint_seconds=0", "network.interreflection=\"radiosity\"",
+    "grid.log2_table_size=10"};
 
 void TrainHere(const fs::path& folder, bool resume = false) {
   TrainRun run;

@@ -318,8 +318,7 @@ TEST(Schedule, LongRunsSettle) {
   settling->Step(0);
   const auto before = steady->state().parameters;
   ASSERT_EQ(settling->state().parameters, before);
-  steady->Step(0);
-  settling->Step(0);
+  EXPECT_NE(steady->Step(0).loss.photometric, settling->Step(0).loss.photometric);
   double whole = 0, part = 0;
   for (size_t i = 0; i < before.size(); ++i) {
     whole += std::abs(double(steady->state().parameters[i]) - before[i]);

@@ -17,8 +17,8 @@ struct Opening {
 };
 
 // In units of 1/s. A thinner section's near share is taken from a series about its middle, whose next term is
-// Δ³/720 of it at most, 1e-5; the closed form loses Δ²/8 of itself to cancellation, so that rounding is 1e-5
-// of it there.
+// Δ³/720 of what the section takes, 1e-5; of the closed form's terms only Δ²/8 remains there, so that their
+// rounding, too, is 1e-5 of it.
 constexpr double kThinSection = 0.2;
 
 // Where Φ(x) is e^x to a float's last bit.

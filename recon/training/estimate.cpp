@@ -41,12 +41,18 @@ TrainEstimate EstimateTraining(const Sequence& sequence, const TrainOptions& opt
   // Where sharpness is scheduled a step's cost follows it: the sharper, the fewer samples of a ray count.
   // These steps are spread over the schedule evenly, however many there will be (multiples of the golden
   // ratio, Weyl 1916), on a field that has hardly been trained.
+  auto iterations = static_cast<double>(options.schedule.iterations);
   const auto step = [&](size_t i) {
     const double progress = std::fmod(0.5 + 0.6180339887498949 * double(i), 1.0);
-    trainer.state().iteration = std::llround(progress * double(options.schedule.iterations));
+    trainer.state().iteration = std::llround(progress * iterations);
     trainer.Step(progress);
   };
-  step(0);  // fills caches and workspaces
+  step(0);                             // fills caches and workspaces
+  if (options.schedule.seconds > 0) {  // of a timed run the second step tells how many there will be
+    const double before = Now();
+    step(0);
+    iterations = options.schedule.seconds / (Now() - before);
+  }
   trainer.MeasurePhases();
   std::vector<double> seconds;
   const double start = Now();

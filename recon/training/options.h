@@ -73,11 +73,11 @@ struct TrainOptions {
     // as any other without one: in tens of thousands of steps bubbles grow behind folds and the wall frays.
     double table_epsilon = 1e-4;
     int64_t table_epsilon_from = 8000;
-    // From that iteration on a run, if it is as long, settles: the wall is as sharp as at the end, a ray's
-    // weights are LinearRayWeights, twice as many look-ups find the surface, and the rate falls with
-    // 1/sqrt(iteration) as well. Under the trapezoidal rule a long run drifts to where that one fits best,
-    // some tenths of a mm off; while the wall is soft, though, the rule's bright front makes up for some of
-    // the light that fog around folds takes. 0: never.
+    // By that iteration, if a run is as long, a scheduled sharpness has reached its end, and from it on the run
+    // settles: a ray's weights are LinearRayWeights, twice as many look-ups find the surface, and the rate
+    // falls with 1/sqrt(iteration) as well. Under the trapezoidal rule a long run drifts to where that one
+    // fits best; while the wall is soft, though, the rule's bright front makes up for some of the light that
+    // fog around folds takes. 0: never.
     int64_t settle_from = 48000;
     double sharpness_start_per_mm = 0.6;
     double sharpness_end_per_mm = 4.4;
