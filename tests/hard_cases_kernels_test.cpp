@@ -37,6 +37,21 @@ struct Ray {
   float sharpness;
 };
 
+// Falling through the wall, rising again, or anything, by turns.
+Ray RandomRay(uint64_t& state, int turn) {
+  Ray ray;
+  ray.sharpness = static_cast<float>(std::abs(RandomSize(state, 0, 6)));
+  const double size = std::pow(10, 3 * Random(state));
+  for (int k = 0; k < Ray::kSamples; ++k) {
+    const double f = turn % 3 == 0   ? 1 - 2.0 * k / Ray::kSamples
+                     : turn % 3 == 1 ? 0.2 * k - 1
+                                     : Random(state);
+    ray.distance[k] = static_cast<float>(size * (f + 0.1 * Random(state)));
+    ray.delta[k] = static_cast<float>(Random(state));
+  }
+  return ray;
+}
+
 // Weights and their gradient in T.
 template <class T>
 struct Weighted {
@@ -60,15 +75,7 @@ TEST(HardCasesTraining, WeightsOfAMillionRaysAreThoseOfDouble) {
   uint64_t state = 1;
   double worst = 0, worst_phi = 0;
   for (int i = 0; i < kStates / 10; ++i) {
-    Ray ray;
-    ray.sharpness = static_cast<float>(std::abs(RandomSize(state, 0, 6)));
-    const double size = std::pow(10, 3 * Random(state));
-    for (int k = 0; k < Ray::kSamples; ++k) {
-      // Falling through the wall, rising again, or anything.
-      const double f = i % 3 == 0 ? 1 - 2.0 * k / Ray::kSamples : i % 3 == 1 ? 0.2 * k - 1 : Random(state);
-      ray.distance[k] = static_cast<float>(size * (f + 0.1 * Random(state)));
-      ray.delta[k] = static_cast<float>(Random(state));
-    }
+    const Ray ray = RandomRay(state, i);
     const Weighted<float> found(ray);
     const Weighted<double> expected(ray);
     double sum = 0, bound = 0;
@@ -112,15 +119,11 @@ TEST(HardCasesTraining, LinearWeightsOfAMillionRaysAreThoseOfDouble) {
   double worst = 0;
   for (int i = 0; i < kStates / 10; ++i) {
     constexpr int n = Ray::kSamples;
-    float f[n], delta[n];
+    const Ray ray = RandomRay(state, i);
+    const float *f = ray.distance, *delta = ray.delta, s = ray.sharpness;
     double f_double[n], delta_double[n];
-    const auto s = static_cast<float>(std::abs(RandomSize(state, 0, 6)));
-    const double size = std::pow(10, 3 * Random(state));
-    for (int k = 0; k < n; ++k) {
-      const double at = i % 3 == 0 ? 1 - 2.0 * k / n : i % 3 == 1 ? 0.2 * k - 1 : Random(state);
-      f_double[k] = f[k] = static_cast<float>(size * (at + 0.1 * Random(state)));
-      delta_double[k] = delta[k] = static_cast<float>(Random(state));
-    }
+    std::copy_n(f, n, f_double);
+    std::copy_n(delta, n, delta_double);
     float occupancy[n], transmittance[n], share[n], weight[n], gradient[n];
     double occupancy_double[n], transmittance_double[n], share_double[n], expected[n], slope[n];
     LinearRayWeights<float>(n, f, s, occupancy, transmittance, share, weight);

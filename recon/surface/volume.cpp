@@ -45,12 +45,10 @@ T NearShare(const Opening<T>& from, const Opening<T>& to, T log_ratio, T drop) {
 
 template <class T>
 void RayWeights(int n, const T* signed_distance, T sharpness, T* occupancy, T* transmittance, T* weight) {
-  // LogSigmoid(x) and Sigmoid(−x) by one exponential.
   const auto log_open = [&](int i) {
-    const T x = sharpness * signed_distance[i];
-    const T e = std::exp(-std::abs(x));
-    occupancy[i] = x > 0 ? e / (1 + e) : 1 / (1 + e);
-    return x >= 0 ? -std::log1p(e) : x - std::log1p(e);
+    const Opening<T> opening(sharpness * signed_distance[i]);
+    occupancy[i] = opening.Occupancy();
+    return opening.Log();
   };
   T log_here = log_open(0);
   transmittance[0] = 1;
