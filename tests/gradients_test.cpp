@@ -225,7 +225,7 @@ class RayLossGradient : public testing::TestWithParam<LookOfWall> {};
 
 TEST_P(RayLossGradient, MatchesFiniteDifferences) {
   FieldOptions options = SmallField(GetParam().reflectance, GetParam().interreflection);
-  options.bound_albedo = options.learn_power = GetParam().bounded;
+  options.bound_albedo = GetParam().bounded;
   options.coat.learn_ior = GetParam().interreflection == Interreflection::kNone;
   if (GetParam().as_paper) {
     options.grid.levels = 0;

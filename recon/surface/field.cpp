@@ -65,7 +65,7 @@ void Field<T>::Initialise(uint64_t seed, T* parameters) const {
     sdf_.Initialise(seed * 3 + 1, kSdfStart, parameters + grid_size());
   }
   color_.Initialise(seed * 3 + 2, kColorStart, parameters + grid_size() + sdf_.parameter_count());
-  if (learns_power()) parameters[power_begin()] = 0;
+  if (bounds_albedo()) parameters[power_begin()] = 0;
   if (has_coat()) InitialiseCoat(options_.coat, parameters + coat_begin());
   if (!has_ambient()) return;
   T* ambient = parameters + grid_size() + sdf_.parameter_count() + color_.parameter_count();

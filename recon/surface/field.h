@@ -54,12 +54,10 @@ struct FieldOptions {
   int features = 15;  // numbers that the distance network hands to the colour network
   double unit_mm = 68;
   Reflectance reflectance = Reflectance::kLambertian;
-  // Of radiosity alone: albedo = sigmoid(output) rather than its exponential. Elsewhere an albedo has to have
-  // headroom for the light between walls that isn't modelled.
-  bool bound_albedo = false;
-  // Whether one factor of all that is seen, the guides' power times the gain, is learnt beside a bounded
-  // albedo.
-  bool learn_power = false;
+  // Of radiosity alone: albedo = sigmoid(output) rather than its exponential, beside one learnt factor of all
+  // that is seen, the guides' power times the gain. Elsewhere an albedo has to have headroom for the light
+  // between walls that isn't modelled.
+  bool bound_albedo = true;
   MucusCoatOptions coat;                                          // of a kCoat wall
   Interreflection interreflection = Interreflection::kRadiosity;  // of a wall that HasAlbedo; others: none
   std::vector<int> ambient_hidden = {16};
@@ -95,9 +93,8 @@ class Field {
     return options_.bound_albedo && HasAlbedo(options_.reflectance) &&
            options_.interreflection == Interreflection::kRadiosity;
   }
-  // Likewise of the power's logarithm, if the field learns_power.
+  // Likewise of the power's logarithm, if the field bounds_albedo.
   size_t power_begin() const { return coat_begin() - power_size(); }
-  bool learns_power() const { return bounds_albedo() && options_.learn_power; }
   // Log albedo of what the colour network puts out, where there is an albedo, with the derivative.
   T LogAlbedo(T output, T* slope = nullptr) const {
     if (slope) *slope = bounds_albedo() ? Sigmoid(-output) : T(1);
@@ -160,7 +157,7 @@ class Field {
  private:
   void FillOutputDelta(SurfacePass* pass) const;
   bool sees_view() const { return !HasAlbedo(options_.reflectance); }
-  size_t power_size() const { return learns_power() ? 1 : 0; }
+  size_t power_size() const { return bounds_albedo() ? 1 : 0; }
   size_t coat_size() const { return has_coat() ? static_cast<size_t>(CoatParameters(options_.coat)) : 0; }
   // Rows of the distance network's input before the three of place.
   int encoded() const { return grid_.outputs() + place_frequency_.outputs(); }

@@ -145,7 +145,7 @@ void RayLoss<T>::ShadeActive(const T* parameters, const RayBatch<T>& batch,
                       ? ShadeCoated(coat, color, normal, lights[frame], point, ambient, &by_coat_[i])
                       : Shade(field_->options().reflectance, color, normal, lights[frame], point, ambient);
   }
-  if (field_->learns_power()) ScaleByPower(std::exp(parameters[field_->power_begin()]));
+  if (field_->bounds_albedo()) ScaleByPower(std::exp(parameters[field_->power_begin()]));
 }
 
 template <class T>
@@ -361,7 +361,7 @@ LossTerms RayLoss<T>::Evaluate(const T* parameters, const RayBatch<T>& batch,
   Lap(clock_, Phase::kPixels);
   field_->ColorBackward(parameters, &surface_, network_gradient);
   if (field_->has_coat()) CoatBackward(parameters, network_gradient);
-  if (field_->learns_power()) PowerBackward(network_gradient);
+  if (field_->bounds_albedo()) PowerBackward(network_gradient);
   if (pose_gradient) AddPoseGradient(parameters, batch, pose_gradient);
 
   const T eikonal_share = settings.eikonal_weight * settings.per_ray / T(batch.samples);

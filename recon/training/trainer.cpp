@@ -27,6 +27,11 @@ constexpr size_t kCamerasAStep = 2 * kTile;  // that are kept in the lumen
 
 constexpr int kSettledLooks = 2;  // times as many look-ups find the surface of a run that settles
 
+// Of the logarithm of the learnt power to that of the one that is given. Between power and albedo pixels tell
+// by the light between walls alone, so that little is enough; and a power that is given wrong, such that
+// albedos would have to pass 1, is learnt against it.
+constexpr float kPowerPull = 1e-4f;
+
 constexpr double kLongestFog = 0.2;  // as a part of the run: a short one, too, is to end with a wall
 
 // In lanes, so that no addition waits for the one before.
@@ -72,11 +77,7 @@ Trainer::Trainer(const TrainingFrames& frames, const TrainOptions& options, uint
     start.reach_mm = FitReach(frames, start, options.bounds.ahead_mm, RandomBits(seed, 0x7265616368ull));
   }
   const InitialSurface initial(start, frames.world_from_camera(), origin_);
-  // Of guides whose power is unknown, or under gains of which none is known, an albedo has no scale of its
-  // own.
-  FieldOptions field = options.field;
-  field.learn_power = !frames.light().calibrated || frames.gains_relative();
-  field_ = std::make_unique<Field<float>>(field, initial, Eigen::AlignedBox3d(-half, half));
+  field_ = std::make_unique<Field<float>>(options.field, initial, Eigen::AlignedBox3d(-half, half));
   for (const Pose& pose : frames.world_from_camera()) {
     lights_.push_back(LightOfFrame<float>(frames.light(), pose, origin_));
     if (!field_->has_ambient() || has_surroundings()) continue;
@@ -153,9 +154,10 @@ void Trainer::MatchColorsToInitialSurface(const InitialSurface& initial) {
     palest = std::max(palest, *middle);
   }
   if (!field_->bounds_albedo()) return;
-  // The palest channel starts in the middle of its range where the power is free to make up for it.
-  const float log_power = field_->learns_power() && std::isfinite(palest) ? palest - std::log(0.5f) : 0.0f;
-  if (field_->learns_power()) state_.parameters[field_->power_begin()] = log_power;
+  // The palest channel starts in the middle of its range, or below it where the given power says so.
+  float log_power = std::isfinite(palest) ? palest - std::log(0.5f) : 0.0f;
+  if (KnowsPower()) log_power = std::max(log_power, 0.0f);
+  state_.parameters[field_->power_begin()] = log_power;
   for (int c = 0; c < 3; ++c) {
     if (!log_ratio[c].empty()) bias[c] = field_->OutputOfLogAlbedo(bias[c] - log_power);
   }
@@ -177,6 +179,9 @@ const float* Trainer::Weights() {
   }
   return weights_.data();
 }
+
+// Of guides whose power is unknown, or under gains of which none is known, an albedo has no scale of its own.
+bool Trainer::KnowsPower() const { return frames_.light().calibrated && !frames_.gains_relative(); }
 
 double Trainer::Settling() const {
   const int64_t from = options_.schedule.settle_from;
@@ -326,6 +331,8 @@ void Trainer::UpdateNetworks(const AdamStep& step) {
     for (size_t i = 0; i < field_->network_size(); ++i) gradient_[begin + i] += chunk.network_gradient[i];
     std::fill(chunk.network_gradient.begin(), chunk.network_gradient.end(), 0.0f);
   }
+  if (field_->bounds_albedo() && KnowsPower())
+    gradient_[field_->power_begin()] += kPowerPull * state_.parameters[field_->power_begin()];
   norm_.PullBack(state_.parameters.data(), gradient_.data());
   AdamUpdate(step, field_->network_size() + norm_.lengths(), &state_.parameters[begin], &gradient_[begin],
              &state_.first[begin], &state_.second[begin]);

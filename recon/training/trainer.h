@@ -94,6 +94,7 @@ class Trainer {
   void RunChunk(int index, const float* weights, const LossSettings<float>& settings);
   void ClearChunks();
   double RateAt(double progress) const;
+  bool KnowsPower() const;
   double Settling() const;  // how far the run has come on its way to settle_from; 1: there
   bool settles() const { return Settling() >= 1; }
   double SharpnessAt(double progress) const;
