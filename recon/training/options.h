@@ -75,10 +75,10 @@ struct TrainOptions {
     int64_t table_epsilon_from = 8000;
     // By that iteration, if a run is as long, a scheduled sharpness has reached its end, and from it on the run
     // settles: a ray's weights are LinearRayWeights, twice as many look-ups find the surface, and the rate
-    // falls with 1/sqrt(iteration) as well. Under the trapezoidal rule a long run drifts to where that one
-    // fits best; while the wall is soft, though, the rule's bright front makes up for some of the light that
-    // fog around folds takes. 0: never.
-    int64_t settle_from = 48000;
+    // falls with 1/sqrt(iteration) as well. Under the trapezoidal rule the wall drifts to where that one fits
+    // best; while it is soft, though, the rule's bright front makes up for some of the light that fog around
+    // folds takes: a wide lumen with deep folds takes that long to find its shape. 0: never.
+    int64_t settle_from = 6000;
     double sharpness_start_per_mm = 0.6;
     double sharpness_end_per_mm = 4.4;
     // Before that the wall is a fog of this sharpness, in which all of it can still move: it lifts, the
