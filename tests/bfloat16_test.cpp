@@ -66,9 +66,10 @@ const Bfloat16Kernels& ModelTileKernels() {
   return Bfloat16TileLoops<ModelTiles, PortableArithmetic>::kKernels;
 }
 
+// AMX's before they are tried: where they are wrong, what tests them is to say so.
 std::vector<const Bfloat16Kernels*> AllKernels() {
   std::vector<const Bfloat16Kernels*> all = {&PortableBfloat16Kernels(), &ModelTileKernels()};
-  for (const Bfloat16Kernels* here : {Avx512Bfloat16Kernels(), AmxBfloat16Kernels()})
+  for (const Bfloat16Kernels* here : {Avx512Bfloat16Kernels(), UntriedAmxBfloat16Kernels()})
     if (here) all.push_back(here);
   return all;
 }

@@ -41,18 +41,23 @@ const Bfloat16Kernels* Avx512Bfloat16Kernels() {
 #endif
 }
 
-const Bfloat16Kernels* AmxBfloat16Kernels() {
+const Bfloat16Kernels* UntriedAmxBfloat16Kernels() {
 #ifdef __x86_64__
   static const bool here =
       Avx512Bfloat16Kernels() && __builtin_cpu_supports("amx-tile") && __builtin_cpu_supports("amx-bf16");
   if (!here) return nullptr;
-  // No machine that this was written on has them, so they are tried before they are used.
   static const Bfloat16Kernels* const permitted = PermittedAmxBfloat16Kernels();
-  static const bool right = permitted && MultipliesRight(*permitted);
-  return right ? permitted : nullptr;
+  return permitted;
 #else
   return nullptr;
 #endif
+}
+
+// No machine that this was written on has them, so they are tried before they are used.
+const Bfloat16Kernels* AmxBfloat16Kernels() {
+  const Bfloat16Kernels* const untried = UntriedAmxBfloat16Kernels();
+  static const bool right = untried && MultipliesRight(*untried);
+  return right ? untried : nullptr;
 }
 
 const Bfloat16Kernels& FastestBfloat16Kernels() {

@@ -40,7 +40,9 @@ bool MultipliesRight(const Bfloat16Kernels& kernels);
 const Bfloat16Kernels& PortableBfloat16Kernels();
 // Null where the processor, or what this was compiled with, doesn't have these instructions.
 const Bfloat16Kernels* Avx512Bfloat16Kernels();
-// Nor where the system doesn't permit them or trial products are wrong.
+// Nor where the system doesn't permit them.
+const Bfloat16Kernels* UntriedAmxBfloat16Kernels();
+// Nor where trial products are wrong.
 const Bfloat16Kernels* AmxBfloat16Kernels();
 const Bfloat16Kernels& FastestBfloat16Kernels();
 
