@@ -28,8 +28,7 @@ float ZeroBetween(float near, float far, float near_value, float far_value) {
 
 }  // namespace
 
-void Marcher::FindCrossings(const float* parameters, const TrainOptions::Sampling& options, uint64_t key,
-                            const RayBatch<float>& batch) {
+void Marcher::FindCrossings(const float* parameters, int looks, uint64_t key, const RayBatch<float>& batch) {
   const int rays = static_cast<int>(batch.rays.size());
   far_.resize(rays);
   jitter_.resize(rays);
@@ -40,13 +39,13 @@ void Marcher::FindCrossings(const float* parameters, const TrainOptions::Samplin
     jitter_[r] = UniformFloat(RandomBits(key, r, 0));
     along_[r] = r;
   }
-  for (int begin = 0; begin < options.coarse && !along_.empty(); begin += kLooksAtOnce) {
-    const int end = std::min(begin + kLooksAtOnce, options.coarse);
+  for (int begin = 0; begin < looks && !along_.empty(); begin += kLooksAtOnce) {
+    const int end = std::min(begin + kLooksAtOnce, looks);
     look_.clear();
     for (int k = begin; k < end; ++k) {
       for (int r : along_) {
         // Denser near the camera, where folds are seen thin; the last look-up is at the far end itself.
-        const float u = k + 1 == options.coarse ? 1.0f : (k + jitter_[r]) / (options.coarse - 1);
+        const float u = k + 1 == looks ? 1.0f : (k + jitter_[r]) / (looks - 1);
         look_.push_back(kNearest_mm + (far_[r] - kNearest_mm) * u * std::sqrt(u));
       }
     }
@@ -66,6 +65,10 @@ void Marcher::FindCrossings(const float* parameters, const TrainOptions::Samplin
     }
     along_.resize(still_open);
   }
+}
+
+void Marcher::NarrowCrossings(const float* parameters, const RayBatch<float>& batch) {
+  const int rays = static_cast<int>(batch.rays.size());
   along_.resize(rays);
   std::iota(along_.begin(), along_.end(), 0);
   look_.resize(rays);
@@ -91,7 +94,8 @@ void Marcher::FindCrossings(const float* parameters, const TrainOptions::Samplin
 
 void Marcher::Place(const float* parameters, const TrainOptions::Sampling& options, float sharpness,
                     uint64_t key, RayBatch<float>* batch) {
-  FindCrossings(parameters, options, key, *batch);
+  FindCrossings(parameters, options.coarse, key, *batch);
+  NarrowCrossings(parameters, *batch);
   const int n = options.surface + options.spread;
   batch->samples = n;
   batch->distance.resize(batch->rays.size() * n);

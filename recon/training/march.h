@@ -20,8 +20,9 @@ class Marcher : public RaySampler {
     float inside, outside;              // distances with the surface between them
     float inside_value, outside_value;  // signed distances there
   };
-  void FindCrossings(const float* parameters, const TrainOptions::Sampling& options, uint64_t key,
-                     const RayBatch<float>& batch);
+  // Fills crossings_ with the first look-ups between which each ray leaves the lumen.
+  void FindCrossings(const float* parameters, int looks, uint64_t key, const RayBatch<float>& batch);
+  void NarrowCrossings(const float* parameters, const RayBatch<float>& batch);
 
   const Field<float>* field_;
   Field<float>::ValuePass pass_;
