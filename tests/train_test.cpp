@@ -291,8 +291,8 @@ TEST(Schedule, FogLiftsAndLeavesTheScheduleAsItWas) {
   }
 }
 
-// A run that is longer than settle_from has its last sharpness by then, and a rate that falls with
-// 1/sqrt(iteration); a shorter one is as it would be without.
+// A run that is longer than settle_from and has come as far as settle_part has its last sharpness by then,
+// and a rate that falls with 1/sqrt(iteration); a shorter one is as it would be without.
 TEST(Schedule, LongRunsSettle) {
   const TrainingFrames frames(test::SmallSequence(), 20, true);
   const auto trainer = [&](std::vector<std::string> settings) {
@@ -302,23 +302,28 @@ TEST(Schedule, LongRunsSettle) {
   };
   const auto soft = trainer({"schedule.sharpness_end_per_mm=2.0", "schedule.settle_from=0"});
   const auto shorter = trainer({"schedule.sharpness_end_per_mm=2.0", "schedule.settle_from=1000"});
-  const auto longer = trainer({"schedule.sharpness_end_per_mm=2.0", "schedule.settle_from=4"});
+  const auto longer =
+      trainer({"schedule.sharpness_end_per_mm=2.0", "schedule.settle_from=4", "schedule.settle_part=1e-3"});
+  const auto by_part =
+      trainer({"schedule.sharpness_end_per_mm=2.0", "schedule.settle_from=1", "schedule.settle_part=0.08"});
   for (int step = 0; step < 8; ++step) {
     const double progress = 0.02 * step;
     EXPECT_NEAR(soft->Step(progress).sharpness_per_mm, 0.5 * std::pow(4, progress), 1e-5);
     shorter->Step(progress);
-    EXPECT_NEAR(longer->Step(progress).sharpness_per_mm, 0.5 * std::pow(4, std::min(1.0, step / 4.0)), 1e-5);
+    const double grown = 0.5 * std::pow(4, std::min(1.0, step / 4.0));
+    EXPECT_NEAR(longer->Step(progress).sharpness_per_mm, grown, 1e-5);
+    EXPECT_NEAR(by_part->Step(progress).sharpness_per_mm, grown, 1e-5);
   }
   EXPECT_EQ(shorter->state().parameters, soft->state().parameters);
 
   // Of one sharpness: the second step is 1/sqrt(2) as long, but for what the ray's weights differ by.
   const auto steady = trainer({"schedule.sharpness_end_per_mm=0.5", "schedule.settle_from=0"});
   const auto settling = trainer({"schedule.sharpness_end_per_mm=0.5", "schedule.settle_from=1"});
-  steady->Step(0);
-  settling->Step(0);
+  steady->Step(0.5);
+  settling->Step(0.5);
   const auto before = steady->state().parameters;
   ASSERT_EQ(settling->state().parameters, before);
-  EXPECT_NE(steady->Step(0).loss.photometric, settling->Step(0).loss.photometric);
+  EXPECT_NE(steady->Step(0.5).loss.photometric, settling->Step(0.5).loss.photometric);
   double whole = 0, part = 0;
   for (size_t i = 0; i < before.size(); ++i) {
     whole += std::abs(double(steady->state().parameters[i]) - before[i]);

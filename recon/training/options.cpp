@@ -197,6 +197,7 @@ void ReadRest(const ConfigTable& root, TrainOptions* options) {
     s.table_epsilon = schedule->Number("table_epsilon", s.table_epsilon, {kLeastAdamEpsilon, 1});
     s.table_epsilon_from = schedule->Integer("table_epsilon_from", s.table_epsilon_from, {0, 1e12});
     s.settle_from = schedule->Integer("settle_from", s.settle_from, {0, 1e12});
+    s.settle_part = schedule->Number("settle_part", s.settle_part, kPositive);
     s.sharpness_rate = schedule->Number("sharpness_rate", s.sharpness_rate, kNotNegative);
     s.sharpness_start_per_mm =
         schedule->Number("sharpness_start_per_mm", s.sharpness_start_per_mm, kPositive);
@@ -332,7 +333,8 @@ std::string FormatTrainOptions(const TrainOptions& o) {
       << kDecayNames[int(o.schedule.decay)] << "\"\nwarm_up = " << o.schedule.warm_up
       << "\nadam_beta2 = " << o.schedule.adam_beta2 << "\ntable_epsilon = " << o.schedule.table_epsilon
       << "\ntable_epsilon_from = " << o.schedule.table_epsilon_from
-      << "\nsettle_from = " << o.schedule.settle_from << "\nsharpness_rate = " << o.schedule.sharpness_rate
+      << "\nsettle_from = " << o.schedule.settle_from << "\nsettle_part = " << o.schedule.settle_part
+      << "\nsharpness_rate = " << o.schedule.sharpness_rate
       << "\nsharpness_start_per_mm = " << o.schedule.sharpness_start_per_mm
       << "\nsharpness_end_per_mm = " << o.schedule.sharpness_end_per_mm
       << "\nfog_per_mm = " << o.schedule.fog_per_mm << "\nfog_iterations = " << o.schedule.fog_iterations

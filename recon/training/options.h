@@ -62,7 +62,7 @@ struct TrainOptions {
   } loss;
 
   struct Schedule {
-    int64_t iterations = 6000;
+    int64_t iterations = 9000;
     double seconds = 0;  // > 0: the run is as long as that instead
     double learning_rate = 1e-2;
     double learning_rate_final = 0.05;  // the part of it that is left at the end
@@ -73,12 +73,14 @@ struct TrainOptions {
     // as any other without one: in tens of thousands of steps bubbles grow behind folds and the wall frays.
     double table_epsilon = 1e-4;
     int64_t table_epsilon_from = 8000;
-    // By that iteration, if a run is as long, a scheduled sharpness has reached its end, and from it on the run
-    // settles: a ray's weights are LinearRayWeights, twice as many look-ups find the surface, and the rate
-    // falls with 1/sqrt(iteration) as well. Under the trapezoidal rule the wall drifts to where that one fits
-    // best; while it is soft, though, the rule's bright front makes up for some of the light that fog around
-    // folds takes: a wide lumen with deep folds takes that long to find its shape. 0: never.
+    // When both that iteration and that part of the run have come, a scheduled sharpness has reached its end,
+    // and from there on the run settles: a ray's weights are LinearRayWeights, twice as many look-ups find
+    // the surface, and the rate falls with 1/sqrt(iteration) as well. Under the trapezoidal rule the wall
+    // drifts to where that one fits best; while it is soft, though, the rule's bright front makes up for some
+    // of the light that fog around folds takes: a wide lumen with deep folds takes that long to find its
+    // shape, and finds it better in longer. 0 iterations: never.
     int64_t settle_from = 6000;
+    double settle_part = 0.2;
     double sharpness_start_per_mm = 0.6;
     double sharpness_end_per_mm = 4.4;
     // Before that the wall is a fog of this sharpness, in which all of it can still move: it lifts, the

@@ -183,14 +183,16 @@ const float* Trainer::Weights() {
 // Of guides whose power is unknown, or under gains of which none is known, an albedo has no scale of its own.
 bool Trainer::KnowsPower() const { return frames_.light().calibrated && !frames_.gains_relative(); }
 
-double Trainer::Settling() const {
-  const int64_t from = options_.schedule.settle_from;
-  return from > 0 ? static_cast<double>(state_.iteration) / static_cast<double>(from) : 0.0;
+double Trainer::Settling(double progress) const {
+  const auto& schedule = options_.schedule;
+  if (schedule.settle_from == 0) return 0;
+  return std::min(static_cast<double>(state_.iteration) / static_cast<double>(schedule.settle_from),
+                  progress / schedule.settle_part);
 }
 
 double Trainer::SharpnessAt(double progress) const {
   const auto& schedule = options_.schedule;
-  const double grown = std::max(progress, std::min(1.0, Settling()));
+  const double grown = std::max(progress, std::min(1.0, Settling(progress)));
   const double set = LogInterpolate(schedule.sharpness_start_per_mm, schedule.sharpness_end_per_mm, grown);
   if (schedule.fog_iterations == 0) return set;
   const double lifted =
@@ -216,13 +218,13 @@ LossSettings<float> Trainer::SettingsAt(double progress) const {
   settings.ambient_doubt = static_cast<float>(options_.loss.ambient_doubt);
   settings.weight_threshold = static_cast<float>(options_.sampling.weight_threshold);
   settings.per_ray = 1.0f / static_cast<float>(options_.sampling.rays);
-  settings.linear_sections = settles();
+  settings.linear_sections = Settling(progress) >= 1;
   return settings;
 }
 
 double Trainer::RateAt(double progress) const {
   const auto& schedule = options_.schedule;
-  const double start = schedule.learning_rate / (settles() ? std::sqrt(Settling()) : 1.0);
+  const double start = schedule.learning_rate / std::sqrt(std::max(1.0, Settling(progress)));
   const double end = start * schedule.learning_rate_final;
   if (progress < schedule.warm_up) return start * progress / schedule.warm_up;
   const double at = (progress - schedule.warm_up) / (1 - schedule.warm_up);
@@ -277,7 +279,7 @@ void Trainer::RunChunk(int index, const float* weights, const LossSettings<float
   const uint64_t step_key = RandomBits(seed_, 0x7261797300ull, static_cast<uint64_t>(state_.iteration));
   const int piece = has_grid() ? chunk.rays : kPieceRays;
   TrainOptions::Sampling sampling = options_.sampling;
-  if (settles()) sampling.coarse *= kSettledLooks;
+  if (settings.linear_sections) sampling.coarse *= kSettledLooks;
   chunk.terms = {};
   for (int begin = 0; begin < chunk.rays; begin += piece) {
     batch.rays.resize(std::min(piece, chunk.rays - begin));

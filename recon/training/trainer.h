@@ -95,8 +95,7 @@ class Trainer {
   void ClearChunks();
   double RateAt(double progress) const;
   bool KnowsPower() const;
-  double Settling() const;  // how far the run has come on its way to settle_from; 1: there
-  bool settles() const { return Settling() >= 1; }
+  double Settling(double progress) const;  // how far the run has come on its way to settling; from 1 on it does
   double SharpnessAt(double progress) const;
   LossSettings<float> SettingsAt(double progress) const;
   bool GradientsAreFinite() const;
