@@ -32,6 +32,11 @@ constexpr int kSettledLooks = 2;  // times as many look-ups find the surface of 
 // albedos would have to pass 1, is learnt against it.
 constexpr float kPowerPull = 1e-4f;
 
+// Logarithm of how many times too small a given power is taken to be at the start. Where the frames ask for
+// more than a thousand, the light's shape is wrong rather than its power: under too narrow a beam the rim
+// asks for any power, and with that the middle is so bright that the wall flees it.
+constexpr float kLargestPowerStart = 6.9f;
+
 constexpr double kLongestFog = 0.2;  // as a part of the run: a short one, too, is to end with a wall
 
 // In lanes, so that no addition waits for the one before.
@@ -156,7 +161,7 @@ void Trainer::MatchColorsToInitialSurface(const InitialSurface& initial) {
   if (!field_->bounds_albedo()) return;
   // The palest channel starts in the middle of its range, or below it where the given power says so.
   float log_power = std::isfinite(palest) ? palest - std::log(0.5f) : 0.0f;
-  if (KnowsPower()) log_power = std::max(log_power, 0.0f);
+  if (KnowsPower()) log_power = std::clamp(log_power, 0.0f, kLargestPowerStart);
   state_.parameters[field_->power_begin()] = log_power;
   for (int c = 0; c < 3; ++c) {
     if (!log_ratio[c].empty()) bias[c] = field_->OutputOfLogAlbedo(bias[c] - log_power);
