@@ -88,7 +88,7 @@ std::vector<TrainKnob> TrainKnobsOf(const TrainOptions& own, int available_frame
   knobs.push_back(NumberKnob(
       "rays", own, Around(own.sampling.rays, pick({0.25, 2}, {0.125, 0.25, 0.5, 2, 4})), own.sampling.rays,
       [](double n, TrainOptions* o) { o->sampling.rays = static_cast<int>(n); }));
-  knobs.push_back(SamplesKnob(own, pick({0.5, 2}, {0.3, 0.5, 0.75, 1.5, 2, 4})));
+  knobs.push_back(SamplesKnob(own, pick({0.5, 2}, {0.5, 0.75, 1.5, 2, 4})));
   if (own.field.grid.levels > 0) {
     const GridOptions& grid = own.field.grid;
     knobs.push_back(
