@@ -68,9 +68,10 @@ TEST(TrainingFrames, KeepsToItsMemory) {
 }
 
 // Peak memory of a run of one step, bytes.
-size_t PeakOfTraining(const std::filesystem::path& sequence, const std::filesystem::path& run) {
+size_t PeakOfTraining(const std::filesystem::path& sequence, const std::filesystem::path& run,
+                      const std::string& cell_mm) {
   const pid_t child = test::StartLumen({"train", sequence.string(), "-o", run.string(), "--iterations", "1",
-                                        "--set", "extract.cell_mm=8", "--quiet", "--threads", "1"});
+                                        "--set", "extract.cell_mm=" + cell_mm, "--quiet", "--threads", "1"});
   int status = 0;
   rusage usage;
   wait4(child, &status, 0, &usage);
@@ -83,7 +84,7 @@ size_t PeakOfTraining(const std::filesystem::path& sequence, const std::filesyst
 // file's and the rows': less than 12 MB, so that the frame isn't held whole.
 TEST(TrainingFrames, AFrameOf4096SquaredIsNotHeldWhole) {
   const test::ScratchFolder scratch;
-  const auto peak = [&](int side) {
+  const auto peak = [&](int side, const std::string& cell_mm) {
     Sequence sequence;
     sequence.folder = scratch / std::to_string(side);
     CreateFolder(sequence.folder);
@@ -98,14 +99,18 @@ TEST(TrainingFrames, AFrameOf4096SquaredIsNotHeldWhole) {
     sequence.frames.resize(1);
     WriteSequenceHeader(sequence);
     WriteImage(FrameFile(sequence.folder, 0, "color.png"), Image8(side, side, 3, 90));
-    return PeakOfTraining(sequence.folder, scratch / "run");
+    return PeakOfTraining(sequence.folder, scratch / "run", cell_mm);
   };
-  const size_t small = peak(64), large = peak(4096);
+  const size_t small = peak(64, "8"), large = peak(4096, "8");
   constexpr size_t kMask = size_t{4096} * 4096;
   // Linux counts a thread's pages by 64 at a time: so far off may each of the two be, and both twice.
   constexpr size_t kCountedAtOnce = 4 * 64 * 4096;
   EXPECT_LT(large - small, kFrameBytes + 12'000'000);
   EXPECT_GT(large - small, kFrameBytes - kMask - kCountedAtOnce);  // so much it does keep
+  // A fine mesh takes the memory that the pixels have given back.
+  const size_t mesh = peak(64, "0.35") - small;
+  EXPECT_GT(mesh, kCountedAtOnce * 4);
+  EXPECT_LT(peak(4096, "0.35"), large + mesh / 2);
 }
 
 }  // namespace

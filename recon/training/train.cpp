@@ -78,7 +78,9 @@ class Run {
     Optimise();
     if (saved_iteration_ != trainer_.state().iteration) Save();
     SayWhichCamerasAreOutside();
-    const Mesh mesh = MeshNow();
+    const std::optional<Continuation> continuation = ContinuationNow();
+    frames_.ReleasePixels();  // a fine mesh takes as much memory as they
+    const Mesh mesh = MeshNow(continuation);
     if (mesh.faces.empty()) {
       throw InputError(run_.folder.string() +
                        ": training left no surface; check poses and light, or train longer");
@@ -174,16 +176,17 @@ class Run {
     result_.skipped_steps = state.skipped_steps;
   }
 
-  Mesh MeshNow() {
+  std::optional<Continuation> ContinuationNow() {
+    if (!options_.continue_lumen) return std::nullopt;
+    return ContinueLumen(frames_, trainer_.field(), trainer_.Weights(), trainer_.origin(), options_.sampling,
+                         run_.seed);
+  }
+
+  Mesh MeshNow(const std::optional<Continuation>& continuation) {
     ExtractOptions extract;
     extract.cell_mm = options_.extract_cell_mm;
     extract.inside = CameraPlaces();
-    std::optional<Continuation> continuation;
-    if (options_.continue_lumen) {
-      continuation = ContinueLumen(frames_, trainer_.field(), trainer_.Weights(), trainer_.origin(),
-                                   options_.sampling, run_.seed);
-      if (continuation) extract.continuation = &*continuation;
-    }
+    if (continuation) extract.continuation = &*continuation;
     Mesh mesh = ExtractMesh(trainer_.field(), trainer_.Weights(), trainer_.origin(), extract);
     if (!options_.poses.refine) return mesh;
     const Similarity back = FromRefined();
@@ -209,7 +212,7 @@ class Run {
          ++meshes_written_) {
       const auto file = MeshAtFile(run_.folder, run_.meshes_at[meshes_written_]);
       if (run_.resume && std::filesystem::exists(file)) continue;
-      const Mesh mesh = MeshNow();
+      const Mesh mesh = MeshNow(ContinuationNow());
       if (!mesh.faces.empty()) WriteMesh(file, mesh);
     }
   }

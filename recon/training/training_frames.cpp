@@ -213,6 +213,13 @@ void TrainingFrames::Draw(uint64_t key, uint64_t first, const Vec3d& origin,
   for (size_t r = 0; r < rays->size(); ++r) Fill(place(r), origin, &(*rays)[r]);
 }
 
+void TrainingFrames::ReleasePixels() {
+  for (Frame& frame : frames_) std::vector<uint8_t>().swap(frame.rgb);
+  std::vector<Vec3f>().swap(rays_);
+  std::vector<float>().swap(vignetting_);
+  std::vector<float>().swap(pattern_);
+}
+
 void TrainingFrames::Fill(const Place& place, const Vec3d& origin, RayBatch<float>::Ray* ray) const {
   const auto [frame_index, pixel] = place;
   const Frame& frame = frames_[frame_index];

@@ -13,9 +13,9 @@ namespace lumen {
 
 // What the frames' pixels may take up with the sequence's mask, bytes. 20 frames of 1350×1080 fit in whole.
 // Of more or larger ones a part of the pixels is kept, the same of every frame and spread evenly: a run of
-// 9,000 iterations looks at 2.3 million rays in all, and even 700 frames keep 42 million pixels. While frames
+// 9,000 iterations looks at 2.3 million rays in all, and even 700 frames keep 40 million pixels. While frames
 // are read, row by row, a megabyte of rows comes on top and a bit a pixel of the image.
-inline constexpr size_t kFrameBytes = 128'000'000;
+inline constexpr size_t kFrameBytes = 124'000'000;
 
 // `kept` of `available` places in ascending order, one at random in each of as many equal parts; all of them,
 // if kept ≥ available.
@@ -59,6 +59,9 @@ class TrainingFrames {
   // Fills the pixels' part of rays: direction and origin relative to `origin`, frame, exposure, floor,
   // observed value and its bounds. Frame and pixel of ray r are chosen, uniformly, by (key, first + r).
   void Draw(uint64_t key, uint64_t first, const Vec3d& origin, std::vector<RayBatch<float>::Ray>* rays) const;
+
+  // Gives back what the pixels take up; from then on nothing may ask for rays, or for a frame's radiance.
+  void ReleasePixels();
 
  private:
   struct Frame {
