@@ -15,8 +15,9 @@ scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 options=(--quiet --set sampling.rays=64 --set extract.cell_mm=3 --set grid.log2_table_size=12
          --set schedule.checkpoint_seconds=0 "$@")
+whole_run=(--iterations 4000)
 
-"$lumen" train "$sequence" -o "$scratch/whole" "${options[@]}" --iterations 4000 >/dev/null
+"$lumen" train "$sequence" -o "$scratch/whole" "${options[@]}" "${whole_run[@]}" >/dev/null
 # A run of one step says how long frames take to read here: a third of the kills is to come later than that.
 began=$(date +%s%N)
 "$lumen" train "$sequence" -o "$scratch/short" "${options[@]}" --iterations 1 >/dev/null
@@ -24,7 +25,7 @@ latest_ms=$((3 * ($(date +%s%N) - began) / 2000000))
 RANDOM=1
 before=0 fell_back=0 ended=0
 for ((i = 0; i < kills; ++i)); do
-  "$lumen" train "$sequence" -o "$scratch/killed" "${options[@]}" --iterations 4000 --resume >/dev/null 2>&1 &
+  "$lumen" train "$sequence" -o "$scratch/killed" "${options[@]}" "${whole_run[@]}" --resume >/dev/null 2>&1 &
   ms=$((RANDOM % latest_ms))
   sleep "$((ms / 1000)).$(printf '%03d' $((ms % 1000)))"
   kill -9 $! 2>/dev/null || ended=$((ended + 1))
@@ -34,7 +35,7 @@ for ((i = 0; i < kills; ++i)); do
     if [[ ! -e $scratch/killed/checkpoint ]]; then fell_back=$((fell_back + 1)); fi
   fi
 done
-"$lumen" train "$sequence" -o "$scratch/killed" "${options[@]}" --iterations 4000 --resume >/dev/null
+"$lumen" train "$sequence" -o "$scratch/killed" "${options[@]}" "${whole_run[@]}" --resume >/dev/null
 [[ $before -gt 0 ]] || { echo "every kill came before the second checkpoint: nothing is shown" >&2; exit 1; }
 echo "$kills runs: $((kills - ended)) killed, $ended had ended; $before killed after the second checkpoint, $fell_back of them within its renames"
 left=$(find "$scratch/killed" -name '.*.tmp*' | wc -l)
