@@ -29,6 +29,12 @@ void AddScaledRows(int rows, T scale, const T* from, T* to) {
   for (int i = 0; i < rows * kTile; ++i) to[i] += scale * from[i];
 }
 
+// Every pass starts by filling it, so that a thread needs one for all networks.
+Bfloat16Products::Room& ThreadsRoom() {
+  thread_local Bfloat16Products::Room room;
+  return room;
+}
+
 }  // namespace
 
 template <class T>
@@ -93,9 +99,9 @@ std::vector<typename Mlp<T>::Matrix> Mlp<T>::matrices() const {
 
 template <class T>
 template <class PassBy>
-void Mlp<T>::WithProducts(const T* parameters, Pass* pass, const PassBy& pass_by) const {
+void Mlp<T>::WithProducts(const T* parameters, const PassBy& pass_by) const {
   if constexpr (std::is_same_v<T, float>) {
-    if (rounded_) return pass_by(Bfloat16Products(*rounded_, parameters, &pass->rounded));
+    if (rounded_) return pass_by(Bfloat16Products(*rounded_, parameters, &ThreadsRoom()));
   }
   pass_by(ExactProducts<T>(parameters));
 }
@@ -112,7 +118,8 @@ void Mlp<T>::ForwardBy(Products products, const T* parameters, const Panel<T>& i
   pass->bend.resize(layer_count() - 1);
   for (int l = 0; l < layer_count(); ++l) {
     const bool last = l + 1 == layer_count();
-    pass->value[l].Resize(last ? outputs : layers_[l + 1].inputs, tiles);
+    // Where nothing asks for them again, a layer's numbers stay until the next tile's.
+    pass->value[l].Resize(last ? outputs : layers_[l + 1].inputs, last || with_slopes ? tiles : 1);
     if (last) break;
     if (with_slopes) pass->slope[l].Resize(layers_[l].outputs, tiles);
     if (with_bends) pass->bend[l].Resize(layers_[l].outputs, tiles);
@@ -122,8 +129,8 @@ void Mlp<T>::ForwardBy(Products products, const T* parameters, const Panel<T>& i
     const T* x = input.Tile(tile);
     for (int l = 0; l < layer_count(); ++l) {
       const MlpLayer& layer = layers_[l];
-      T* y = pass->value[l].Tile(tile);
       const bool last = l + 1 == layer_count();
+      T* y = pass->value[l].Tile(last || with_slopes ? tile : 0);
       products.Multiply(layer, parameters + layer.bias, last ? outputs : layer.outputs, x, y);
       if (!last) {
         T* slope = with_slopes ? pass->slope[l].Tile(tile) : nullptr;
@@ -268,19 +275,19 @@ void Mlp<T>::BackwardSecondOrderBy(Products products, const Panel<T>& input, con
 
 template <class T>
 void Mlp<T>::Forward(const T* parameters, const Panel<T>& input, int outputs, Keep keep, Pass* pass) const {
-  WithProducts(parameters, pass,
+  WithProducts(parameters,
                [&](auto products) { ForwardBy(products, parameters, input, outputs, keep, pass); });
 }
 
 template <class T>
 void Mlp<T>::InputGradient(const T* parameters, Pass* pass) const {
-  WithProducts(parameters, pass, [&](auto products) { InputGradientBy(products, parameters, pass); });
+  WithProducts(parameters, [&](auto products) { InputGradientBy(products, parameters, pass); });
 }
 
 template <class T>
 void Mlp<T>::Backward(const T* parameters, const Panel<T>& input, const Panel<T>& output_delta, Pass* pass,
                       T* gradient, Panel<T>* input_delta) const {
-  WithProducts(parameters, pass, [&](auto products) {
+  WithProducts(parameters, [&](auto products) {
     BackwardBy(products, input, output_delta, nullptr, pass, gradient, input_delta);
   });
 }
@@ -289,7 +296,7 @@ template <class T>
 void Mlp<T>::BackwardSecondOrder(const T* parameters, const Panel<T>& input, const Panel<T>& output_delta,
                                  const Panel<T>& direction, Pass* pass, T* gradient,
                                  Panel<T>* input_delta) const {
-  WithProducts(parameters, pass, [&](auto products) {
+  WithProducts(parameters, [&](auto products) {
     BackwardSecondOrderBy(products, input, output_delta, direction, pass, gradient, input_delta);
   });
 }

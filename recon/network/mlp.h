@@ -56,7 +56,7 @@ class Mlp {
   // What the passes over one batch leave for each other. Reuse it: it keeps its memory.
   struct Pass {
     // h_l; value[L−1] is the output (l counted from 0 here and below). Where a layer joins the input to it,
-    // value, pulled and tangent hold the rows of both.
+    // value, pulled and tangent hold the rows of both. Under Keep::kNothing the hidden layers' are one tile.
     std::vector<Panel<T>> value;
     std::vector<Panel<T>> slope;    // σ′(a_l), hidden layers
     std::vector<Panel<T>> bend;     // σ″(a_l), hidden layers, if asked for
@@ -67,7 +67,6 @@ class Mlp {
     std::vector<Panel<T>> delta;    // ∂loss/∂a_l
     Panel<T> input_gradient;        // q
     Panel<T> joined_delta;          // ∂loss/∂(h, x)/√2 of one tile, where the shape has a skip
-    Bfloat16Products::Room rounded;
   };
 
   // What a forward pass keeps for the passes that may follow.
@@ -95,7 +94,7 @@ class Mlp {
   bool JoinsInput(int layer) const { return layer > 0 && layer == shape_.skip; }
   // pass_by(products), which are ExactProducts<T> or Bfloat16Products.
   template <class PassBy>
-  void WithProducts(const T* parameters, Pass* pass, const PassBy& pass_by) const;
+  void WithProducts(const T* parameters, const PassBy& pass_by) const;
   template <class Products>
   void ForwardBy(Products products, const T* parameters, const Panel<T>& input, int outputs, Keep keep,
                  Pass* pass) const;

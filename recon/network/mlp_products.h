@@ -41,7 +41,7 @@ class ExactProducts {
 
 class Bfloat16Products {
  public:
-  // Rounded numbers between the products of a pass. Reuse it: it keeps its memory.
+  // Rounded numbers between the products of one pass. Reuse it: it keeps its memory.
   struct Room {
     LineVector<uint32_t> weights;  // of a layer from its offset on
     LineVector<uint32_t> tile;
