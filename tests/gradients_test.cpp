@@ -280,7 +280,9 @@ TEST_P(RayLossGradient, MatchesFiniteDifferences) {
     gradient.assign(field.parameter_count(), 0.0);
     const LossTerms terms = ray_loss.Evaluate(parameters.data(), batch, lights, log_gain, settings,
                                               gradient.data() + field.grid_size(), &(gain_gradient = 0));
-    for (int l = 0; l < field.grid().levels(); ++l) ray_loss.GridBackward(l, gradient.data());
+    Field<double>::GridTrace trace;
+    ray_loss.LeaveForGrid(&trace);
+    for (int l = 0; l < field.grid().levels(); ++l) field.GridBackward(l, trace, gradient.data());
     by_log_sharpness = terms.by_log_sharpness;
     EXPECT_EQ(terms.active_samples, 72);
     EXPECT_GT(terms.photometric, 0.01);

@@ -1,6 +1,7 @@
 #include "recon/surface/field.h"
 
 #include <cmath>
+#include <utility>
 
 namespace lumen {
 namespace {
@@ -319,9 +320,18 @@ void Field<T>::PositionsBackward(const T* parameters, SurfacePass* backward, T* 
 }
 
 template <class T>
-void Field<T>::GridBackward(int level, const SurfacePass& pass, int count, T* grid_gradient) const {
-  grid_.BackwardSecondOrder(level, pass.positions, pass.input_delta, pass.sdf.input_gradient,
-                            pass.scaled_direction, count, grid_gradient);
+void Field<T>::LeaveForGrid(SurfacePass* pass, int count, GridTrace* trace) const {
+  trace->count = count;
+  std::swap(trace->positions, pass->positions);
+  std::swap(trace->delta, pass->input_delta);
+  std::swap(trace->pull, pass->sdf.input_gradient);
+  std::swap(trace->direction, pass->scaled_direction);
+}
+
+template <class T>
+void Field<T>::GridBackward(int level, const GridTrace& trace, T* grid_gradient) const {
+  grid_.BackwardSecondOrder(level, trace.positions, trace.delta, trace.pull, trace.direction, trace.count,
+                            grid_gradient);
 }
 
 template class Field<float>;

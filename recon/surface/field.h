@@ -151,8 +151,19 @@ class Field {
   void PositionsBackward(const T* parameters, SurfacePass* pass, T* unused_gradient,
                          Panel<T>* positions_delta) const;
 
-  // What the backward pass leaves for one level of the grid, from the first `count` samples.
-  void GridBackward(int level, const SurfacePass& pass, int count, T* grid_gradient) const;
+  // What the backward pass leaves for the grid. Reuse it: it keeps its memory.
+  struct GridTrace {
+    int count = 0;       // samples
+    Panel<T> positions;  // 3 rows
+    Panel<T> delta;      // ∂loss/∂input of the distance network
+    Panel<T> pull;       // ∂its first output/∂input
+    Panel<T> direction;  // 3 rows, ∂loss/∂gradient · unit
+  };
+  // After SurfaceBackward: of the pass's first `count` samples. Takes the pass's panels for it and gives it
+  // the trace's earlier ones to reuse.
+  void LeaveForGrid(SurfacePass* pass, int count, GridTrace* trace) const;
+  // Adds what a trace holds for one level.
+  void GridBackward(int level, const GridTrace& trace, T* grid_gradient) const;
 
  private:
   void FillOutputDelta(SurfacePass* pass) const;

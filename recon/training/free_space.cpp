@@ -21,13 +21,14 @@ T FreeSpace<T>::Evaluate(const T* parameters, const std::vector<Vec3<T>>& places
     loss += weight / T(count) * missing;
     indices.push_back(i);
   }
-  short_ = static_cast<int>(indices.size());
-  if (short_ == 0) return 0;
+  const int missed = static_cast<int>(indices.size());
+  trace_.count = 0;
+  if (missed == 0) return 0;
 
-  const int tiles = TilesFor(short_);
+  const int tiles = TilesFor(missed);
   surface_.positions.Resize(3, tiles);
   for (int i = 0; i < tiles * kTile; ++i) {
-    const int place = indices[std::min(i, short_ - 1)];
+    const int place = indices[std::min(i, missed - 1)];
     for (int d = 0; d < 3; ++d) surface_.positions.At(d, i) = places[place][d];
   }
   field_->Surface(parameters, &surface_);
@@ -37,14 +38,15 @@ T FreeSpace<T>::Evaluate(const T* parameters, const std::vector<Vec3<T>>& places
   surface_.value_delta.SetZero();
   surface_.gradient_delta.SetZero();
   surface_.color_input_delta.SetZero();
-  for (int i = 0; i < short_; ++i) surface_.value_delta.At(0, i) = -weight / T(count);
+  for (int i = 0; i < missed; ++i) surface_.value_delta.At(0, i) = -weight / T(count);
   field_->SurfaceBackward(parameters, &surface_, network_gradient);
+  field_->LeaveForGrid(&surface_, missed, &trace_);
   return loss;
 }
 
 template <class T>
 void FreeSpace<T>::GridBackward(int level, T* grid_gradient) const {
-  if (short_ > 0) field_->GridBackward(level, surface_, short_, grid_gradient);
+  if (trace_.count > 0) field_->GridBackward(level, trace_, grid_gradient);
 }
 
 template class FreeSpace<float>;

@@ -27,7 +27,7 @@ class FreeSpace {
   const Field<T>* field_;
   typename Field<T>::ValuePass value_;
   typename Field<T>::SurfacePass surface_;
-  int short_ = 0;  // places that fall short
+  typename Field<T>::GridTrace trace_;  // of the places that fall short
 };
 
 }  // namespace lumen

@@ -24,7 +24,7 @@ void ImportanceSampler::PlaceUniform(const float* parameters, int count, uint64_
   for (size_t r = 0; r < rays; ++r) {
     const auto& ray = batch.rays[r];
     const float far = FarthestSample(field_->box(), ray.origin, ray.direction);
-    const float jitter = UniformFloat(RandomBits(key, r, 0));  // the whole ray's, as NeuS's
+    const float jitter = UniformFloat(RandomBits(key, batch.first + r, 0));  // the whole ray's, as NeuS's
     for (int k = 0; k < count; ++k)
       look_[k * rays + r] = kNearest_mm + (far - kNearest_mm) * (k + jitter) / count;
   }
@@ -90,7 +90,8 @@ void ImportanceSampler::Place(const float* parameters, const TrainOptions::Sampl
   batch->distance.clear();
   for (size_t r = 0; r < batch->rays.size(); ++r) {
     for (const Sample& sample : samples_[r]) batch->distance.push_back(sample.distance);
-    batch->rays[r].eikonal_sample = static_cast<int>(RandomBits(key, r, 1) % uint64_t(batch->samples));
+    batch->rays[r].eikonal_sample =
+        static_cast<int>(RandomBits(key, batch->first + r, 1) % uint64_t(batch->samples));
   }
 }
 

@@ -6,7 +6,7 @@
 #include "common/files.h"
 #include "common/parallel.h"
 #include "recon/training/checkpoint.h"
-#include "recon/training/march.h"
+#include "recon/training/meet_surface.h"
 #include "recon/training/surroundings.h"
 #include "recon/training/trainer.h"
 

@@ -36,7 +36,7 @@ void Marcher::FindCrossings(const float* parameters, int looks, uint64_t key, co
   along_.resize(rays);
   for (int r = 0; r < rays; ++r) {
     far_[r] = FarthestSample(field_->box(), batch.rays[r].origin, batch.rays[r].direction);
-    jitter_[r] = UniformFloat(RandomBits(key, r, 0));
+    jitter_[r] = UniformFloat(RandomBits(key, batch.first + r, 0));
     along_[r] = r;
   }
   for (int begin = 0; begin < looks && !along_.empty(); begin += kLooksAtOnce) {
@@ -109,35 +109,22 @@ void Marcher::Place(const float* parameters, const TrainOptions::Sampling& optio
     float* distance = &batch->distance[r * n];
     const float last = std::clamp(meets + 0.5f * options.surface * spacing, 2 * kNearest_mm, far_[r]);
     for (int k = 0; k < options.surface; ++k) {
-      const float jitter = UniformFloat(RandomBits(key, r, 1 + k));
+      const float jitter = UniformFloat(RandomBits(key, batch->first + r, 1 + k));
       const float t = meets + spacing * (k + jitter - 0.5f * options.surface);
       placed_[k] = std::clamp(t, kNearest_mm, far_[r]);
     }
     for (int k = 0; k < options.spread; ++k) {
-      const float jitter = UniformFloat(RandomBits(key, r, 1 + options.surface + k));
+      const float jitter = UniformFloat(RandomBits(key, batch->first + r, 1 + options.surface + k));
       placed_[options.surface + k] = kNearest_mm + (last - kNearest_mm) * (k + jitter) / options.spread;
     }
-    const float eikonal = placed_[options.surface + RandomBits(key, r, 1 + n) % options.spread];
+    const float eikonal =
+        placed_[options.surface + RandomBits(key, batch->first + r, 1 + n) % options.spread];
     // Each kind is in order as it is made.
     std::merge(placed_.begin(), placed_.begin() + options.surface, placed_.begin() + options.surface,
                placed_.end(), distance);
     batch->rays[r].eikonal_sample =
         static_cast<int>(std::lower_bound(distance, distance + n, eikonal) - distance);
   }
-}
-
-Panel<float> MeetSurface(const Field<float>& field, const float* parameters,
-                         const TrainOptions::Sampling& sampling, uint64_t key, RayBatch<float>* batch) {
-  constexpr float kSharp = 1e3f;  // 1/mm: the samples around the surface lie within a hundredth of a mm of it
-  Marcher(&field).Place(parameters, sampling, kSharp, key, batch);
-  const int rays = static_cast<int>(batch->rays.size());
-  Panel<float> positions(3, TilesFor(rays));
-  for (int r = 0; r < rays; ++r) {
-    const auto& ray = batch->rays[r];
-    const float t = batch->distance[size_t(r + 1) * batch->samples - 1];
-    for (int d = 0; d < 3; ++d) positions.At(d, r) = ray.origin[d] + t * ray.direction[d];
-  }
-  return positions;
 }
 
 }  // namespace lumen

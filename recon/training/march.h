@@ -31,9 +31,4 @@ class Marcher : public RaySampler {
   std::vector<Crossing> crossings_;
 };
 
-// Where the batch's rays meet the surface, to a hundredth of a mm: places samples as `sampling` and `key`
-// say, of which each ray's last lies there. Their positions, 3 × rays.
-Panel<float> MeetSurface(const Field<float>& field, const float* parameters,
-                         const TrainOptions::Sampling& sampling, uint64_t key, RayBatch<float>* batch);
-
 }  // namespace lumen

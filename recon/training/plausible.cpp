@@ -9,7 +9,7 @@
 #include "common/error.h"
 #include "common/progress.h"
 #include "common/statistics.h"
-#include "recon/training/march.h"
+#include "recon/training/meet_surface.h"
 
 namespace lumen {
 namespace {
@@ -119,28 +119,15 @@ std::vector<size_t> PlacesOutside(const Field<float>& field, const float* parame
 WallSeen LookAtWall(const Field<float>& field, const float* parameters,
                     const TrainOptions::Sampling& sampling, RayBatch<float>* batch) {
   const int rays = static_cast<int>(batch->rays.size());
-  Field<float>::SurfacePass pass;
-  pass.positions = MeetSurface(field, parameters, sampling, 0, batch);
-  pass.directions.Resize(3, TilesFor(rays));
-  pass.normal.Resize(3, TilesFor(rays));
-  for (int r = 0; r < TilesFor(rays) * kTile; ++r) {
-    for (int d = 0; d < 3; ++d) pass.directions.At(d, r) = batch->rays[std::min(r, rays - 1)].direction[d];
-  }
-  field.Surface(parameters, &pass);
-  for (int r = 0; r < TilesFor(rays) * kTile; ++r) {
-    const Vec3f normal = Column(pass.gradient, r).normalized();
-    for (int d = 0; d < 3; ++d) pass.normal.At(d, r) = normal[d];
-  }
-  field.Color(parameters, &pass);
-
+  const SurfaceMet met = LookAtSurface(field, parameters, sampling, 0, batch);
   WallSeen wall;
   std::vector<double> distances_mm;
-  Vec3f low = Column(pass.color_output(), 0), high = low;
+  Vec3f low = Column(met.color, 0), high = low;
   for (int r = 0; r < rays; ++r) {
-    distances_mm.push_back((Column(pass.positions, r) - batch->rays[r].origin).norm());
-    wall.beyond += pass.free.At(0, r) == 0 ? 1.0 / rays : 0.0;
-    low = low.cwiseMin(Column(pass.color_output(), r));
-    high = high.cwiseMax(Column(pass.color_output(), r));
+    distances_mm.push_back((Column(met.positions, r) - batch->rays[r].origin).norm());
+    wall.beyond += met.free.At(0, r) == 0 ? 1.0 / rays : 0.0;
+    low = low.cwiseMin(Column(met.color, r));
+    high = high.cwiseMax(Column(met.color, r));
   }
   wall.median_mm = MedianOf(distances_mm);
   wall.one_color = (high - low).maxCoeff() < kSameColor;

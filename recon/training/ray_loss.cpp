@@ -413,20 +413,6 @@ void RayLoss<T>::CoatBackward(const T* parameters, T* network_gradient) const {
                      network_gradient + (begin - field_->grid_size()));
 }
 
-template <class T>
-bool RayLoss<T>::GridGradientIsFinite() const {
-  // A sum of sizes is not finite if any of them isn't; a sum a lane, so that it takes no time.
-  T sum[kTile] = {};
-  for (const Panel<T>* panel :
-       {&surface_.input_delta, &surface_.scaled_direction, &surface_.sdf.input_gradient}) {
-    for (int row = 0; row < panel->tiles() * panel->rows(); ++row)
-      for (int s = 0; s < kTile; ++s) sum[s] += std::abs(panel->Tile(0)[row * kTile + s]);
-  }
-  T total = 0;
-  for (T lane : sum) total += lane;
-  return total < T(kLargestGradient);
-}
-
 template class RayLoss<float>;
 template class RayLoss<double>;
 

@@ -5,6 +5,7 @@
 #pragma once
 
 #include <array>
+#include <cstdint>
 #include <vector>
 
 #include "recon/surface/field.h"
@@ -36,6 +37,7 @@ struct RayBatch {
     int eikonal_sample;  // one sample a ray that the eikonal term sees wherever it lies
   };
   std::vector<Ray> rays;
+  uint64_t first = 0;       // the first ray's number among those whose random numbers have one key
   int samples = 0;          // a ray
   std::vector<T> distance;  // rays × samples, increasing, mm
 };
@@ -83,7 +85,7 @@ class RayLoss {
   void set_clock(PhaseClock* clock) { clock_ = clock; }
 
   // Loss of a batch. Adds the gradient by the networks' parameters to network_gradient and by each frame's
-  // log gain to log_gain_gradient; the grid's part waits for GridBackward. pose_gradient: null, or
+  // log gain to log_gain_gradient; the grid's part waits for LeaveForGrid. pose_gradient: null, or
   // kPoseNumbers a frame, to which is added the gradient by a motion of the frame's camera with its rays,
   // their samples and its lights. The ambient network stands still (Field::PositionsBackward).
   LossTerms Evaluate(const T* parameters, const RayBatch<T>& batch, const std::vector<FrameLight<T>>& lights,
@@ -97,11 +99,10 @@ class RayLoss {
   // Of each ray's last sample, which lies on the surface (MeetSurface). The field must have an albedo.
   std::vector<Wall> LookAtLast(const T* parameters, const RayBatch<T>& batch,
                                const std::vector<FrameLight<T>>& lights, const std::vector<T>& log_gain);
-  void GridBackward(int level, T* grid_gradient) const {
-    field_->GridBackward(level, surface_, static_cast<int>(active_.size()), grid_gradient);
+  // After Evaluate: what its batch sends back to the grid (Field::GridBackward).
+  void LeaveForGrid(typename Field<T>::GridTrace* trace) {
+    field_->LeaveForGrid(&surface_, static_cast<int>(active_.size()), trace);
   }
-  // Whether everything that GridBackward spreads over the grid is below kLargestGradient.
-  bool GridGradientIsFinite() const;
 
  private:
   struct Active {

@@ -19,7 +19,7 @@ class RaySampler {
   virtual ~RaySampler() = default;
 
   // Fills batch->samples, distance and each ray's eikonal_sample. The jitter is a function of (key, ray's
-  // place in the batch, sample).
+  // number, sample).
   virtual void Place(const float* parameters, const TrainOptions::Sampling& options, float sharpness,
                      uint64_t key, RayBatch<float>* batch) = 0;
 };

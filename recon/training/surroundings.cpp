@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "recon/surface/radiosity.h"
-#include "recon/training/march.h"
+#include "recon/training/meet_surface.h"
 
 namespace lumen {
 namespace {
@@ -30,18 +30,14 @@ DirectionMap<float> SurroundingsOf(const Field<float>& field, const float* param
     batch.rays[cell].origin = light.camera;
     batch.rays[cell].direction = light.camera_from_field.transpose() * DirectionMap<float>::Direction(cell);
   }
-  Field<float>::SurfacePass pass;
-  pass.positions = MeetSurface(field, parameters, sampling, 0, &batch);
-  pass.normal.Resize(3, TilesFor(kCells));
-  field.Surface(parameters, &pass);
-  field.Color(parameters, &pass);
+  const SurfaceMet wall = LookAtSurface(field, parameters, sampling, 0, &batch);
   const auto vector = [](const Panel<float>& panel, int i) {
     return Vec3f(panel.At(0, i), panel.At(1, i), panel.At(2, i));
   };
   std::vector<Patch> patches(kCells);
   std::vector<int> group(kCells);
   for (int i = 0; i < kCells; ++i) {
-    const Vec3f gradient = vector(pass.gradient, i), point = vector(pass.positions, i);
+    const Vec3f gradient = vector(wall.gradient, i), point = vector(wall.positions, i);
     const float length = gradient.norm();
     const Vec3f normal = length > 0 ? Vec3f(gradient / length) : Vec3f(-batch.rays[i].direction);
     Patch& patch = patches[i];
@@ -50,7 +46,7 @@ DirectionMap<float> SurroundingsOf(const Field<float>& field, const float* param
     const double cosine = std::max<double>(kShallowestCosine, -normal.dot(batch.rays[i].direction));
     const double distance = batch.distance[size_t(i + 1) * batch.samples - 1];
     patch.area_mm2 = double(DirectionMap<float>::SolidAngle(i)) * distance * distance / cosine;
-    for (int c = 0; c < 3; ++c) patch.albedo[c] = std::exp(field.LogAlbedo(pass.color_output().At(c, i)));
+    for (int c = 0; c < 3; ++c) patch.albedo[c] = std::exp(field.LogAlbedo(wall.color.At(c, i)));
     patch.irradiance =
         kPi * Shade<float>(Reflectance::kLambertian, Vec3f::Zero(), normal, light, point, Vec3f::Zero())
                   .radiance.cast<double>();

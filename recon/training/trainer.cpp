@@ -4,12 +4,13 @@
 #include <cmath>
 #include <limits>
 #include <numeric>
+#include <span>
 
 #include "common/parallel.h"
 #include "common/random.h"
 #include "recon/training/hue_slope.h"
 #include "recon/training/initial_reach.h"
-#include "recon/training/march.h"
+#include "recon/training/meet_surface.h"
 #include "recon/training/surroundings.h"
 
 namespace lumen {
@@ -17,9 +18,8 @@ namespace {
 
 constexpr int kChunkRays = 32;  // also what the pulls on albedo and ambient factor take their means over
 
-// Rays that are computed at once where chunks share workspaces: enough to keep the products busy, few enough
-// for the memory that a wide network's passes take.
-constexpr int kPieceRays = 4;
+// Enough to keep the products busy, few enough for the memory that a wide network's passes take.
+constexpr int kPieceRays = 2;
 
 constexpr int64_t kSurroundingsEvery = 250;  // iterations
 
@@ -51,6 +51,19 @@ double SumOfSizes(const Vector& values) {
   return std::accumulate(lanes, lanes + kLanes, 0.0);
 }
 
+// Whether all that goes back to the grid is below kLargestGradient: a sum of sizes isn't if any of them
+// isn't. A sum a lane, so that it takes no time.
+bool IsFinite(const Field<float>::GridTrace& trace) {
+  float sum[kTile] = {};
+  for (const Panel<float>* panel : {&trace.delta, &trace.direction, &trace.pull}) {
+    for (int row = 0; row < panel->tiles() * panel->rows(); ++row)
+      for (int s = 0; s < kTile; ++s) sum[s] += std::abs(panel->Tile(0)[row * kTile + s]);
+  }
+  float total = 0;
+  for (float lane : sum) total += lane;
+  return total < static_cast<float>(kLargestGradient);
+}
+
 double LogInterpolate(double from, double to, double at) { return from * std::pow(to / from, at); }
 
 }  // namespace
@@ -69,6 +82,10 @@ Eigen::AlignedBox3d SceneBounds(const std::vector<Pose>& world_from_camera,
     }
   }
   return box;
+}
+
+int RaysAtOnce(const TrainOptions& options) {
+  return options.field.grid.levels > 0 ? kChunkRays : kPieceRays;
 }
 
 Trainer::Trainer(const TrainingFrames& frames, const TrainOptions& options, uint64_t seed)
@@ -91,13 +108,13 @@ Trainer::Trainer(const TrainingFrames& frames, const TrainOptions& options, uint
   for (int begin = 0; begin < options.sampling.rays; begin += kChunkRays) {
     Chunk chunk;
     chunk.rays = std::min(kChunkRays, options.sampling.rays - begin);
-    chunk.network_gradient.assign(field_->network_size(), 0.0f);
     chunk.log_gain_gradient.assign(frames.size(), 0.0f);
     if (options.poses.refine) chunk.pose_gradient.assign(size_t(frames.size()) * kPoseNumbers, 0.0f);
     chunks_.push_back(std::move(chunk));
   }
   update_clocks_.resize(field_->grid().levels() + 1);
   free_space_ = std::make_unique<FreeSpace<float>>(field_.get());
+  network_gradients_ = std::make_unique<OrderedSum>(field_->network_size());
   norm_ = field_->Normalisation();
   const size_t count = field_->parameter_count() + norm_.lengths();
   state_.parameters.resize(count);
@@ -252,63 +269,72 @@ PhaseSeconds Trainer::phase_seconds() const {
   return sum;
 }
 
-std::unique_ptr<Trainer::Workspace> Trainer::TakeWorkspace(Chunk* chunk) {
-  std::unique_ptr<Workspace> workspace = std::move(chunk->workspace);
-  if (!workspace) {
-    const std::lock_guard lock(idle_mutex_);
-    if (!idle_.empty()) {
-      workspace = std::move(idle_.back());
-      idle_.pop_back();
-    }
-  }
-  if (!workspace) workspace = std::make_unique<Workspace>(options_.sampling, field_.get());
+std::unique_ptr<Trainer::Workspace> Trainer::TakeWorkspace() {
+  const std::lock_guard lock(idle_mutex_);
+  if (idle_.empty()) return std::make_unique<Workspace>(options_.sampling, field_.get());
+  std::unique_ptr<Workspace> workspace = std::move(idle_.back());
+  idle_.pop_back();
   return workspace;
 }
 
-void Trainer::LeaveWorkspace(std::unique_ptr<Workspace> workspace, Chunk* chunk) {
-  if (has_grid()) {
-    chunk->workspace = std::move(workspace);
-    return;
-  }
+void Trainer::LeaveWorkspace(std::unique_ptr<Workspace> workspace) {
   const std::lock_guard lock(idle_mutex_);
   idle_.push_back(std::move(workspace));
 }
 
-void Trainer::RunChunk(int index, const float* weights, const LossSettings<float>& settings) {
+void Trainer::RunChunk(int index, const float* weights, const LossSettings<float>& settings,
+                       float* network_gradient) {
   Chunk& chunk = chunks_[index];
-  std::unique_ptr<Workspace> workspace = TakeWorkspace(&chunk);
+  std::unique_ptr<Workspace> workspace = TakeWorkspace();
   RayBatch<float>& batch = workspace->batch;
   PhaseClock* clock = chunk.clock.get();
   workspace->loss.set_clock(clock);
   if (clock) clock->Start();
   const uint64_t step_key = RandomBits(seed_, 0x7261797300ull, static_cast<uint64_t>(state_.iteration));
-  const int piece = has_grid() ? chunk.rays : kPieceRays;
+  const uint64_t places_key = RandomBits(step_key, static_cast<uint64_t>(index), 1);
+  const int piece = RaysAtOnce(options_);
   TrainOptions::Sampling sampling = options_.sampling;
   if (settings.linear_sections) sampling.coarse *= kSettledLooks;
   chunk.terms = {};
   for (int begin = 0; begin < chunk.rays; begin += piece) {
     batch.rays.resize(std::min(piece, chunk.rays - begin));
+    batch.first = begin;
     frames_.Draw(step_key, static_cast<uint64_t>(index) * kChunkRays + begin, origin_, &batch.rays);
     if (refines_poses())
       for (auto& ray : batch.rays) Move(state_.poses, &ray);
     Lap(clock, Phase::kRays);
-    workspace->sampler->Place(weights, sampling, settings.sharpness,
-                              RandomBits(step_key, static_cast<uint64_t>(index), 1 + begin), &batch);
+    workspace->sampler->Place(weights, sampling, settings.sharpness, places_key, &batch);
     Lap(clock, Phase::kPlaces);
     chunk.terms += workspace->loss.Evaluate(
-        weights, batch, lights_, state_.log_gain, settings, chunk.network_gradient.data(),
-        chunk.log_gain_gradient.data(), chunk.pose_gradient.empty() ? nullptr : chunk.pose_gradient.data());
+        weights, batch, lights_, state_.log_gain, settings, network_gradient, chunk.log_gain_gradient.data(),
+        chunk.pose_gradient.empty() ? nullptr : chunk.pose_gradient.data());
   }
+  if (has_grid()) workspace->loss.LeaveForGrid(&chunk.to_grid);
+  LeaveWorkspace(std::move(workspace));
   const double sum = std::abs(chunk.terms.Sum()) + std::abs(chunk.terms.by_log_sharpness) +
-                     SumOfSizes(chunk.network_gradient) + SumOfSizes(chunk.log_gain_gradient) +
-                     SumOfSizes(chunk.pose_gradient);
+                     SumOfSizes(std::span(network_gradient, field_->network_size())) +
+                     SumOfSizes(chunk.log_gain_gradient) + SumOfSizes(chunk.pose_gradient);
   // Written so that NaN fails.
-  chunk.finite = sum < kLargestGradient && (!has_grid() || workspace->loss.GridGradientIsFinite());
-  LeaveWorkspace(std::move(workspace), &chunk);
+  chunk.finite = sum < kLargestGradient && (!has_grid() || IsFinite(chunk.to_grid));
 }
 
-// Adds to the first chunk's gradient, after its rays. Of many cameras so many take their turn.
-double Trainer::KeepCamerasFree(const float* weights) {
+LossTerms Trainer::RunChunks(const float* weights, const LossSettings<float>& settings) {
+  network_gradients_->Start();
+  std::atomic<int> next = 0;
+  LossTerms sum;
+  ParallelFor(0, static_cast<int64_t>(chunks_.size()), [&](int64_t) {
+    const int index = next++;  // in order, so that few gradients wait for the ones before them
+    OrderedSum::Term gradient = network_gradients_->Take();
+    RunChunk(index, weights, settings, gradient.data());
+    if (index == 0) sum.free_space = KeepCamerasFree(weights, gradient.data());
+    network_gradients_->Add(index, std::move(gradient), &gradient_[field_->grid_size()]);
+  });
+  for (const Chunk& chunk : chunks_) sum += chunk.terms;
+  return sum;
+}
+
+// With the first chunk, after its rays. Of many cameras so many take their turn.
+double Trainer::KeepCamerasFree(const float* weights, float* network_gradient) {
   if (options_.loss.free_space == 0) return 0;
   const size_t all = lights_.size(), some = std::min(all, kCamerasAStep);
   camera_places_.resize(some);
@@ -316,17 +342,16 @@ double Trainer::KeepCamerasFree(const float* weights) {
     camera_places_[i] = lights_[(static_cast<size_t>(state_.iteration) * some + i) % all].camera;
   }
   return free_space_->Evaluate(weights, camera_places_, static_cast<float>(options_.loss.clearance_mm),
-                               static_cast<float>(options_.loss.free_space),
-                               chunks_.front().network_gradient.data());
+                               static_cast<float>(options_.loss.free_space), network_gradient);
 }
 
 bool Trainer::GradientsAreFinite() const {
   return std::all_of(chunks_.begin(), chunks_.end(), [](const Chunk& chunk) { return chunk.finite; });
 }
 
-void Trainer::ClearChunks() {
+void Trainer::ClearGradients() {
+  std::fill_n(&gradient_[field_->grid_size()], field_->network_size(), 0.0f);
   for (Chunk& chunk : chunks_) {
-    std::fill(chunk.network_gradient.begin(), chunk.network_gradient.end(), 0.0f);
     std::fill(chunk.log_gain_gradient.begin(), chunk.log_gain_gradient.end(), 0.0f);
     std::fill(chunk.pose_gradient.begin(), chunk.pose_gradient.end(), 0.0f);
   }
@@ -334,10 +359,6 @@ void Trainer::ClearChunks() {
 
 void Trainer::UpdateNetworks(const AdamStep& step) {
   const size_t begin = field_->grid_size();
-  for (Chunk& chunk : chunks_) {
-    for (size_t i = 0; i < field_->network_size(); ++i) gradient_[begin + i] += chunk.network_gradient[i];
-    std::fill(chunk.network_gradient.begin(), chunk.network_gradient.end(), 0.0f);
-  }
   if (field_->bounds_albedo() && KnowsPower())
     gradient_[field_->power_begin()] += kPowerPull * state_.parameters[field_->power_begin()];
   norm_.PullBack(state_.parameters.data(), gradient_.data());
@@ -433,18 +454,12 @@ StepReport Trainer::Step(double progress) {
   const float* weights = Weights();
   StepReport report;
   report.sharpness_per_mm = settings.sharpness;
-  double free_space = 0;
-  ParallelFor(0, static_cast<int64_t>(chunks_.size()), [&](int64_t i) {
-    RunChunk(static_cast<int>(i), weights, settings);
-    if (i == 0) free_space = KeepCamerasFree(weights);
-  });
-  for (const Chunk& chunk : chunks_) report.loss += chunk.terms;
-  report.loss.free_space = free_space;
+  report.loss = RunChunks(weights, settings);
   ++state_.iteration;
   if (!GradientsAreFinite()) {
     report.skipped = true;
     if (state_.skipped_steps++ == 0) state_.first_skipped_step = state_.iteration - 1;
-    ClearChunks();
+    ClearGradients();
     return report;
   }
   const double rate = RateAt(progress);
@@ -463,7 +478,7 @@ StepReport Trainer::Step(double progress) {
     }
     // From the finest level on, which has the most to do.
     const int level = levels - 1 - static_cast<int>(task);
-    for (Chunk& chunk : chunks_) chunk.workspace->loss.GridBackward(level, gradient_.data());
+    for (Chunk& chunk : chunks_) field_->GridBackward(level, chunk.to_grid, gradient_.data());
     free_space_->GridBackward(level, gradient_.data());
     Lap(clock, Phase::kGrid);
     const size_t begin = field_->grid().level_begin(level);

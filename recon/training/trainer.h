@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -12,6 +13,7 @@
 #include "recon/network/adam.h"
 #include "recon/training/free_space.h"
 #include "recon/training/options.h"
+#include "recon/training/ordered_sum.h"
 #include "recon/training/phase_clock.h"
 #include "recon/training/pose_refinement.h"
 #include "recon/training/ray_loss.h"
@@ -44,6 +46,10 @@ struct StepReport {
   bool skipped = false;
 };
 
+// Rays that a thread computes at once: with a grid a whole chunk of a step; without one, where networks are
+// wide, a piece of it.
+int RaysAtOnce(const TrainOptions& options);
+
 class Trainer {
  public:
   // `frames` must outlive the trainer.
@@ -68,7 +74,7 @@ class Trainer {
   const TrainState& state() const { return state_; }
 
  private:
-  // What computing with some rays takes.
+  // What computing with some rays takes; one a thread.
   struct Workspace {
     Workspace(const TrainOptions::Sampling& sampling, const Field<float>* field)
         : sampler(MakeRaySampler(sampling, field)), loss(field) {}
@@ -76,12 +82,10 @@ class Trainer {
     std::unique_ptr<RaySampler> sampler;
     RayLoss<float> loss;
   };
-  // Rays that are computed by one thread. With a grid all together, as the workspace holds what goes back to
-  // the grid; without one piece by piece, in a workspace that chunks hand on to each other.
+  // Rays that are computed by one thread, and what is kept of them until all are.
   struct Chunk {
     int rays = 0;
-    std::unique_ptr<Workspace> workspace;
-    LineVector<float> network_gradient;
+    Field<float>::GridTrace to_grid;
     std::vector<float> log_gain_gradient;
     std::vector<float> pose_gradient;  // empty where poses stay as they are given
     LossTerms terms;
@@ -89,19 +93,23 @@ class Trainer {
     bool finite = true;                 // loss and gradient
   };
   bool has_grid() const { return field_->grid_size() > 0; }
-  std::unique_ptr<Workspace> TakeWorkspace(Chunk* chunk);
-  void LeaveWorkspace(std::unique_ptr<Workspace> workspace, Chunk* chunk);
-  void RunChunk(int index, const float* weights, const LossSettings<float>& settings);
-  void ClearChunks();
+  std::unique_ptr<Workspace> TakeWorkspace();
+  void LeaveWorkspace(std::unique_ptr<Workspace> workspace);
+  void RunChunk(int index, const float* weights, const LossSettings<float>& settings,
+                float* network_gradient);
+  // Of all chunks, on all threads; fills them and the networks' part of gradient_.
+  LossTerms RunChunks(const float* weights, const LossSettings<float>& settings);
+  void ClearGradients();
   double RateAt(double progress) const;
   bool KnowsPower() const;
-  double Settling(double progress) const;  // how far the run has come on its way to settling; from 1 on it does
+  double Settling(
+      double progress) const;  // how far the run has come on its way to settling; from 1 on it does
   double SharpnessAt(double progress) const;
   LossSettings<float> SettingsAt(double progress) const;
   bool GradientsAreFinite() const;
   bool has_surroundings() const;
   void UpdateSurroundings();
-  double KeepCamerasFree(const float* weights);
+  double KeepCamerasFree(const float* weights, float* network_gradient);
   void UpdateNetworks(const AdamStep& step);
   void UpdateGains(const AdamStep& step);
   bool refines_poses() const { return state_.poses.frames() > 0; }
@@ -124,7 +132,8 @@ class Trainer {
   std::vector<Vec3f> camera_places_;  // that it looks at
   std::mutex idle_mutex_;
   std::vector<std::unique_ptr<Workspace>> idle_;
-  LineVector<float> gradient_;
+  std::unique_ptr<OrderedSum> network_gradients_;  // of the chunks
+  LineVector<float> gradient_;                     // zero between the steps
   TrainState state_;
 };
 

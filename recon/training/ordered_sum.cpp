@@ -1,0 +1,38 @@
+#include "recon/training/ordered_sum.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace lumen {
+
+void OrderedSum::Start() {
+  const std::lock_guard lock(mutex_);
+  next_ = 0;
+}
+
+OrderedSum::Term OrderedSum::Take() {
+  Term term;
+  {
+    const std::lock_guard lock(mutex_);
+    if (!idle_.empty()) {
+      term = std::move(idle_.back());
+      idle_.pop_back();
+    }
+  }
+  term.assign(size_, 0.0f);
+  return term;
+}
+
+void OrderedSum::Add(int64_t number, Term term, float* sum) {
+  const std::lock_guard lock(mutex_);
+  early_.emplace(number, std::move(term));
+  for (auto first = early_.begin(); first != early_.end() && first->first == next_; first = early_.begin()) {
+    const Term& due = first->second;
+    for (size_t i = 0; i < size_; ++i) sum[i] += due[i];
+    idle_.push_back(std::move(first->second));
+    early_.erase(first);
+    ++next_;
+  }
+}
+
+}  // namespace lumen
