@@ -11,6 +11,8 @@ namespace {
 
 constexpr char kMagic[8] = {'l', 'u', 'm', 'e', 'n', 'c', 'k', '6'};
 
+constexpr size_t kLargestRest = 1024;  // bytes of a checkpoint besides its arrays and settings
+
 // FNV-1a, 64 bits (Fowler, Noll, Vo).
 uint64_t Checksum(std::string_view bytes) {
   uint64_t hash = 0xcbf29ce484222325ull;
@@ -104,6 +106,9 @@ void Rename(const std::filesystem::path& from, const std::filesystem::path& to) 
 void WriteCheckpoint(const std::filesystem::path& file, const std::string& settings,
                      const TrainState& state) {
   Writer writer;
+  size_t numbers = 0;
+  Arrays([&](const auto& values) { numbers += values.size() * sizeof(values[0]); }, state);
+  writer.bytes.reserve(numbers + settings.size() + kLargestRest);
   writer.bytes.append(kMagic, sizeof(kMagic));
   writer.Array(settings);
   Fields([&](const auto& value) { writer.Value(value); }, state);

@@ -10,6 +10,7 @@
 #include "common/parallel.h"
 #include "common/random.h"
 #include "recon/training/hue_slope.h"
+#include "recon/training/memory.h"
 #include "recon/training/plausible.h"
 #include "recon/training/pose_noise.h"
 
@@ -255,7 +256,7 @@ TrainingFrames FramesFor(const Sequence& given, const TrainOptions& options, uin
     if (!changed) changed = given;
     AddPoseNoise({options.poses.disturb_mm, options.poses.disturb_rad}, seed, &*changed);
   }
-  return TrainingFrames(changed ? *changed : given, options.frames, lit);
+  return TrainingFrames(changed ? *changed : given, options.frames, lit, FrameBytes(options));
 }
 
 }  // namespace lumen

@@ -11,10 +11,10 @@
 
 namespace lumen {
 
-// What the frames' pixels may take up with the sequence's mask, bytes. 20 frames of 1350×1080 fit in whole.
-// Of more or larger ones a part of the pixels is kept, the same of every frame and spread evenly: a run of
-// 9,000 iterations looks at 2.3 million rays in all, and even 700 frames keep 40 million pixels. While frames
-// are read, row by row, a megabyte of rows comes on top and a bit a pixel of the image.
+// What the frames' pixels may take up at most with the sequence's mask, bytes. 20 frames of 1350×1080 fit in
+// whole. Of more or larger ones a part of the pixels is kept, the same of every frame and spread evenly: a
+// run of 9,000 iterations looks at 2.3 million rays in all, and even 700 frames keep 40 million pixels. While
+// frames are read, row by row, a megabyte of rows comes on top and a bit a pixel of the image.
 inline constexpr size_t kFrameBytes = 124'000'000;
 
 // `kept` of `available` places in ascending order, one at random in each of as many equal parts; all of them,
