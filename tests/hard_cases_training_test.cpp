@@ -405,6 +405,27 @@ TEST(HardCasesTraining, LearningRatesTooHigh) {
   EXPECT_TRUE(AllFinite(state.parameters) && AllFinite(state.first) && AllFinite(state.second));
 }
 
+// Of a step that is skipped nothing stays but the count: what follows is what another trainer makes of the
+// state.
+TEST(HardCasesTraining, AStepThatIsSkippedLeavesNothingBehind) {
+  const TrainOptions options = ReadTrainOptions("fast", {});
+  const TrainingFrames frames(SmallSequence(), 6, true);
+  Trainer trainer(frames, options, 0);
+  for (int step = 0; step < 3; ++step) ASSERT_FALSE(trainer.Step(0.1).skipped);
+  const LineVector<float> good = trainer.state().parameters;
+  std::ranges::fill(trainer.state().parameters, std::numeric_limits<float>::quiet_NaN());
+  EXPECT_TRUE(trainer.Step(0.1).skipped);
+  trainer.state().parameters = good;
+  EXPECT_EQ(trainer.state().first_skipped_step, 3);
+
+  Trainer other(frames, options, 0);
+  other.state() = trainer.state();
+  for (Trainer* each : {&trainer, &other}) EXPECT_FALSE(each->Step(0.1).skipped);
+  EXPECT_NE(trainer.state().parameters, good);
+  EXPECT_EQ(trainer.state().parameters, other.state().parameters);
+  EXPECT_EQ(trainer.state().log_gain, other.state().log_gain);
+}
+
 // Whatever the field's values have become, samples are finite, in order and on their ray: sorting numbers
 // that aren't would write beyond its end.
 TEST(HardCasesTraining, SamplersOnFieldsThatAreNotFinite) {

@@ -37,8 +37,8 @@ TEST(OrderedSum, RoundsAsInOrderWhicheverComesFirst) {
   int others = 0;
   do {
     std::vector<float> sum(kSize, 0.0f);
-    ordered.Start();
-    for (int number : order) ordered.Add(number, Filled(ordered.Take(), number), sum.data());
+    ordered.Start(sum.data());
+    for (int number : order) ordered.Add(number, Filled(ordered.Take(), number));
     EXPECT_EQ(sum, expected);
     others += SumIn(order) != expected;
   } while (std::ranges::next_permutation(order).found);
@@ -48,11 +48,12 @@ TEST(OrderedSum, RoundsAsInOrderWhicheverComesFirst) {
 TEST(OrderedSum, AddsATermWhenThoseBeforeItAreThere) {
   OrderedSum ordered(1);
   float sum = 0;
+  ordered.Start(&sum);
   const auto add = [&](int number, float value) {
     OrderedSum::Term term = ordered.Take();
     EXPECT_EQ(term, OrderedSum::Term(1, 0.0f));
     term[0] = value;
-    ordered.Add(number, std::move(term), &sum);
+    ordered.Add(number, std::move(term));
   };
   add(2, 4);
   add(1, 2);
@@ -63,15 +64,27 @@ TEST(OrderedSum, AddsATermWhenThoseBeforeItAreThere) {
   EXPECT_EQ(sum, 15);
 }
 
+TEST(OrderedSum, StartsAfreshAfterARoundThatWasntFinished) {
+  OrderedSum ordered(1);
+  float left = 0, sum = 0;
+  ordered.Start(&left);
+  ordered.Add(1, OrderedSum::Term(1, 5.0f));  // whose 0 never comes
+  ordered.Start(&sum);
+  for (int number : {0, 1}) ordered.Add(number, OrderedSum::Term(1, 1.0f));
+  EXPECT_EQ(left, 0);
+  EXPECT_EQ(sum, 2);
+}
+
 TEST(OrderedSum, TakesTermsOfSeveralThreads) {
   constexpr int kTerms = 1000;
   std::vector<int> order(kTerms);
   std::iota(order.begin(), order.end(), 0);
   OrderedSum ordered(kSize);
   std::vector<float> sum(kSize, 0.0f);
-  ordered.Start();
-  ParallelFor(0, kTerms,
-              [&](int64_t i) { ordered.Add(i, Filled(ordered.Take(), static_cast<int>(i)), sum.data()); });
+  ordered.Start(sum.data());
+  SetThreadCount(4);
+  ParallelFor(0, kTerms, [&](int64_t i) { ordered.Add(i, Filled(ordered.Take(), static_cast<int>(i))); });
+  SetThreadCount(0);
   EXPECT_EQ(sum, SumIn(order));
 }
 

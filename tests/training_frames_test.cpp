@@ -65,5 +65,15 @@ TEST(TrainingFrames, KeepsToItsMemory) {
   }
 }
 
+TEST(TrainingFrames, RefuseToDrawPixelsThatWereGivenBack) {
+  TrainingFrames frames(test::SmallSequence(), 2, true);
+  std::vector<RayBatch<float>::Ray> rays(1);
+  frames.Draw(5, 0, Vec3d::Zero(), &rays);
+  frames.ReleasePixels();
+  EXPECT_THROW(frames.Draw(5, 0, Vec3d::Zero(), &rays), std::bad_optional_access);
+  EXPECT_THROW((void)frames.MeanRadiance(0), std::bad_optional_access);
+  EXPECT_EQ(frames.world_from_camera().size(), 2u);
+}
+
 }  // namespace
 }  // namespace lumen

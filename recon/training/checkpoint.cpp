@@ -9,9 +9,11 @@
 namespace lumen {
 namespace {
 
-constexpr char kMagic[8] = {'l', 'u', 'm', 'e', 'n', 'c', 'k', '6'};
+constexpr char kMagic[8] = {'l', 'u', 'm', 'e', 'n', 'c', 'k', '7'};
 
-constexpr size_t kLargestRest = 1024;  // bytes of a checkpoint besides its arrays and settings
+// Bytes of a checkpoint besides its arrays and settings: two dozen numbers. Room for all at once, for a
+// string that grows step by step takes up to three times as much.
+constexpr size_t kLargestRest = 1024;
 
 // FNV-1a, 64 bits (Fowler, Noll, Vo).
 uint64_t Checksum(std::string_view bytes) {

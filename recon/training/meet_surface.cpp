@@ -7,7 +7,7 @@
 namespace lumen {
 namespace {
 
-constexpr int kTilesAtOnce = 2;
+constexpr int kTilesAtOnce = 2;  // of the paper's networks 5 MB
 
 void CopyTiles(const Panel<float>& from, int first, Panel<float>* to) {
   std::copy_n(from.Tile(0), from.tiles() * from.rows() * kTile, to->Tile(first));

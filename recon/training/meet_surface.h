@@ -22,7 +22,7 @@ struct SurfaceMet {
   Panel<float> free;       // 1 row, 0 where the field's bounds cut it off
   Panel<float> color;      // 3 rows, the colour network's outputs
 };
-// Two tiles at a time, so that of a wide network, too, little more than the answer is held at once.
+// A few tiles at a time, so that of a wide network, too, little more than the answer is held at once.
 SurfaceMet LookAtSurface(const Field<float>& field, const float* parameters,
                          const TrainOptions::Sampling& sampling, uint64_t key, RayBatch<float>* batch);
 

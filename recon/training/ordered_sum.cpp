@@ -1,13 +1,14 @@
 #include "recon/training/ordered_sum.h"
 
-#include <algorithm>
 #include <utility>
 
 namespace lumen {
 
-void OrderedSum::Start() {
+void OrderedSum::Start(float* sum) {
   const std::lock_guard lock(mutex_);
+  sum_ = sum;
   next_ = 0;
+  early_.clear();  // of a round that an exception has ended
 }
 
 OrderedSum::Term OrderedSum::Take() {
@@ -23,12 +24,12 @@ OrderedSum::Term OrderedSum::Take() {
   return term;
 }
 
-void OrderedSum::Add(int64_t number, Term term, float* sum) {
+void OrderedSum::Add(int64_t number, Term term) {
   const std::lock_guard lock(mutex_);
   early_.emplace(number, std::move(term));
   for (auto first = early_.begin(); first != early_.end() && first->first == next_; first = early_.begin()) {
     const Term& due = first->second;
-    for (size_t i = 0; i < size_; ++i) sum[i] += due[i];
+    for (size_t i = 0; i < size_; ++i) sum_[i] += due[i];
     idle_.push_back(std::move(first->second));
     early_.erase(first);
     ++next_;

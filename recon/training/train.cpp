@@ -65,7 +65,7 @@ class Run {
   Run(const Sequence& sequence, const TrainOptions& options, const TrainRun& run)
       : options_(ForFrames(options, std::min(options.frames, static_cast<int>(sequence.frames.size())))),
         run_(run),
-        frames_(FramesFor(sequence, options, run.seed)),
+        frames_(FramesFor(sequence, options_, run.seed)),
         trainer_(frames_, options_, run.seed),
         settings_("seed = " + std::to_string(run.seed) + "\n" + FormatTrainOptions(options_)) {}
 

@@ -1,6 +1,7 @@
 #include "recon/training/trainer.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -11,15 +12,11 @@
 #include "recon/training/hue_slope.h"
 #include "recon/training/initial_reach.h"
 #include "recon/training/meet_surface.h"
+#include "recon/training/memory.h"
 #include "recon/training/surroundings.h"
 
 namespace lumen {
 namespace {
-
-constexpr int kChunkRays = 32;  // also what the pulls on albedo and ambient factor take their means over
-
-// Enough to keep the products busy, few enough for the memory that a wide network's passes take.
-constexpr int kPieceRays = 2;
 
 constexpr int64_t kSurroundingsEvery = 250;  // iterations
 
@@ -84,10 +81,6 @@ Eigen::AlignedBox3d SceneBounds(const std::vector<Pose>& world_from_camera,
   return box;
 }
 
-int RaysAtOnce(const TrainOptions& options) {
-  return options.field.grid.levels > 0 ? kChunkRays : kPieceRays;
-}
-
 Trainer::Trainer(const TrainingFrames& frames, const TrainOptions& options, uint64_t seed)
     : frames_(frames), options_(options), seed_(seed) {
   const Eigen::AlignedBox3d bounds = SceneBounds(frames.world_from_camera(), options.bounds);
@@ -136,13 +129,14 @@ Trainer::Trainer(const TrainingFrames& frames, const TrainOptions& options, uint
   if (has_surroundings() && frames.size() > 1 && frames.hue_slope() < kHueSlopeOfWallLight) {
     std::fill_n(&state_.parameters[field_->ambient_bias_begin()], 3, 0.0f);
   }
-  if (options.field.reflectance != Reflectance::kUnlit) MatchColorsToInitialSurface(initial);
+  if (options.field.reflectance != Reflectance::kUnlit) MatchBrightnessToInitialSurface(initial);
 }
 
-// Starts the colours where they explain the pixels' median brightness on the initial surface. From anywhere
-// else the first steps would move the surface, which answers faster, to make up for the colours, and a wrong
-// scale is a trap: a dark wall that is near looks much like a bright one that is far.
-void Trainer::MatchColorsToInitialSurface(const InitialSurface& initial) {
+// Starts the colours, and the power where it is learnt, where they explain the pixels' median brightness on
+// the initial surface. From anywhere else the first steps would move the surface, which answers faster, to
+// make up for the colours, and a wrong scale is a trap: a dark wall that is near looks much like a bright one
+// that is far.
+void Trainer::MatchBrightnessToInitialSurface(const InitialSurface& initial) {
   constexpr int kRays = 1024;
   RayBatch<float> batch;
   batch.rays.resize(kRays);
@@ -319,15 +313,17 @@ void Trainer::RunChunk(int index, const float* weights, const LossSettings<float
 }
 
 LossTerms Trainer::RunChunks(const float* weights, const LossSettings<float>& settings) {
-  network_gradients_->Start();
+  network_gradients_->Start(&gradient_[field_->grid_size()]);
   std::atomic<int> next = 0;
   LossTerms sum;
   ParallelFor(0, static_cast<int64_t>(chunks_.size()), [&](int64_t) {
-    const int index = next++;  // in order, so that few gradients wait for the ones before them
+    // In order, so that few gradients wait for the ones before them; the loop's own index says nothing of
+    // when.
+    const int index = next++;
     OrderedSum::Term gradient = network_gradients_->Take();
     RunChunk(index, weights, settings, gradient.data());
     if (index == 0) sum.free_space = KeepCamerasFree(weights, gradient.data());
-    network_gradients_->Add(index, std::move(gradient), &gradient_[field_->grid_size()]);
+    network_gradients_->Add(index, std::move(gradient));
   });
   for (const Chunk& chunk : chunks_) sum += chunk.terms;
   return sum;

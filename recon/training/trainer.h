@@ -3,7 +3,6 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <mutex>
@@ -45,10 +44,6 @@ struct StepReport {
   double sharpness_per_mm = 0;
   bool skipped = false;
 };
-
-// Rays that a thread computes at once: with a grid a whole chunk of a step; without one, where networks are
-// wide, a piece of it.
-int RaysAtOnce(const TrainOptions& options);
 
 class Trainer {
  public:
@@ -116,7 +111,7 @@ class Trainer {
   void UpdatePoses(double progress);
   void PlaceLights();
   void UpdateSharpness(double rate, double gradient);
-  void MatchColorsToInitialSurface(const InitialSurface& initial);
+  void MatchBrightnessToInitialSurface(const InitialSurface& initial);
 
   const TrainingFrames& frames_;
   TrainOptions options_;

@@ -10,7 +10,6 @@
 #include "common/parallel.h"
 #include "common/random.h"
 #include "recon/training/hue_slope.h"
-#include "recon/training/memory.h"
 #include "recon/training/plausible.h"
 #include "recon/training/pose_noise.h"
 
@@ -52,17 +51,17 @@ TrainingFrames::TrainingFrames(const Sequence& sequence, int count, bool lit, si
   const size_t bytes_a_pixel =
       sizeof(Vec3f) + 2 * sizeof(float) + sizeof(uint32_t) + 3 * static_cast<size_t>(taken);
   const size_t mask_bytes = std::min(sequence.calibration.mask.data.size(), bytes / 2);
-  const std::vector<uint32_t> pixels =
+  const std::vector<uint32_t> places =
       FindPixels(sequence.calibration, std::max<size_t>(1, (bytes - mask_bytes) / bytes_a_pixel));
-  if (pixels.empty()) throw InputError(sequence.folder.string() + ": no pixel carries image; check the mask");
+  if (places.empty()) throw InputError(sequence.folder.string() + ": no pixel carries image; check the mask");
   for (int i = 0; i < 256; ++i) decoded_[i] = static_cast<float>(Decode(calibration_.response, i / 255.0));
-  ReadFrames(sequence, UniformFrames(available, taken), pixels);
+  ReadFrames(sequence, UniformFrames(available, taken), places);
   CheckPoses(sequence.folder, numbers_, poses_);
   if (lit_) FindScale(sequence);
 }
 
 void TrainingFrames::ReadFrames(const Sequence& sequence, const std::vector<int>& indices,
-                                const std::vector<uint32_t>& pixels) {
+                                const std::vector<uint32_t>& places) {
   const CameraIntrinsics& intrinsics = calibration_.camera;
   const Camera<double> camera(intrinsics);
   std::optional<HueSlope> hue;
@@ -76,17 +75,18 @@ void TrainingFrames::ReadFrames(const Sequence& sequence, const std::vector<int>
     frame.gain = source.gain.value_or(1.0);
     frame.log_gain_reach = source.gain ? source.log_gain_error.value_or(0.0) : INFINITY;
     gains_known_ = gains_known_ && source.gain.has_value() && !source.log_gain_error;
-    frame.rgb.reserve(pixels.size() * 3);
-    auto pixel = pixels.begin();
+    std::vector<uint8_t>& shown = pixels_->rgb.emplace_back();
+    shown.reserve(places.size() * 3);
+    auto place = places.begin();
     ReadColorRows(sequence, source, [&](int y, const uint8_t* rgb) {
       if (hue) hue->AddRow(y, rgb);
       const size_t row = size_t(y) * intrinsics.width;
-      for (; pixel != pixels.end() && *pixel < row + intrinsics.width; ++pixel) {
-        const uint8_t* kept = rgb + 3 * (*pixel - row);
-        frame.rgb.insert(frame.rgb.end(), kept, kept + 3);
+      for (; place != places.end() && *place < row + intrinsics.width; ++place) {
+        const uint8_t* kept = rgb + 3 * (*place - row);
+        shown.insert(shown.end(), kept, kept + 3);
       }
     });
-    frames_.push_back(std::move(frame));
+    frames_.push_back(frame);
     numbers_.push_back(source.number);
     poses_.push_back(source.world_from_camera);
   }
@@ -119,47 +119,47 @@ std::vector<uint32_t> TrainingFrames::FindPixels(const Calibration& calibration,
   });
   std::partial_sum(begin.begin(), begin.end(), begin.begin());
 
-  std::vector<uint32_t> pixels = SpreadEvenly(begin.back(), most);  // among those that tell something, so far
-  rays_.resize(pixels.size());
-  vignetting_.resize(pixels.size());
-  pattern_.resize(pixels.size());
+  std::vector<uint32_t> places = SpreadEvenly(begin.back(), most);  // among those that tell something, so far
+  Pixels& pixels = *pixels_;
+  pixels.rays.resize(places.size());
+  pixels.vignetting.resize(places.size());
+  pixels.pattern.resize(places.size());
   // A row looks up and replaces its own places only.
   std::vector<size_t> first(height + 1);
   for (int y = 0; y <= height; ++y)
-    first[y] = static_cast<size_t>(std::ranges::lower_bound(pixels, begin[y]) - pixels.begin());
+    first[y] = static_cast<size_t>(std::ranges::lower_bound(places, begin[y]) - places.begin());
   ParallelFor(0, height, [&](int64_t y) {
     size_t kept = first[y], place = begin[y];
     for (int x = 0; x < width && kept < first[y + 1]; ++x) {
-      if (!rows[y][x] || place++ != pixels[kept]) continue;
+      if (!rows[y][x] || place++ != places[kept]) continue;
       const Vec3d ray = *camera.Unproject(Vec2d(x, double(y)));
-      rays_[kept] = ray.cast<float>();
-      vignetting_[kept] = static_cast<float>(Vignetting(calibration.response, ray.z()));
-      pattern_[kept] = static_cast<float>(PatternAlong(light, ray));
-      pixels[kept++] = static_cast<uint32_t>(y * width + x);
+      pixels.rays[kept] = ray.cast<float>();
+      pixels.vignetting[kept] = static_cast<float>(Vignetting(calibration.response, ray.z()));
+      pixels.pattern[kept] = static_cast<float>(PatternAlong(light, ray));
+      places[kept++] = static_cast<uint32_t>(y * width + x);
     }
   });
-  return pixels;
+  return places;
 }
 
 double TrainingFrames::inverse_gamma() const {
   return 1 / (calibration_.response.srgb ? 2.2 : calibration_.response.gamma);
 }
 
-double TrainingFrames::Normaliser(size_t pixel) const { return double(vignetting_[pixel]) * pattern_[pixel]; }
-
 void TrainingFrames::FindScale(const Sequence& sequence) {
   double sum = 0;
   size_t count = 0, saturated = 0;
   std::vector<double> radiance;  // a frame: the mean of what its pixels show at gain 1
-  for (const Frame& frame : frames_) {
+  for (size_t f = 0; f < frames_.size(); ++f) {
+    const double gain = frames_[f].gain;
     double shown = 0;
     const size_t before = count;
-    for (size_t pixel = 0; pixel < rays_.size(); pixel += 97) {
+    for (size_t pixel = 0; pixel < pixels_->rays.size(); pixel += 97) {
       for (int c = 0; c < 3; ++c, ++count) {
-        const uint8_t value = frame.rgb[3 * pixel + c];
-        const double linear = decoded_[value] / (frame.gain * Normaliser(pixel));
+        const uint8_t value = pixels_->rgb[f][3 * pixel + c];
+        const double linear = decoded_[value] / (gain * pixels_->Normaliser(pixel));
         sum += std::pow(linear, inverse_gamma());
-        shown += decoded_[value] / frame.gain;
+        shown += decoded_[value] / gain;
         saturated += value == 255;
       }
     }
@@ -187,54 +187,51 @@ bool TrainingFrames::learns_first_gain() const {
 }
 
 Vec3d TrainingFrames::MeanRadiance(int frame) const {
+  const Pixels& pixels = pixels_.value();
   Vec3d sum = Vec3d::Zero();
-  for (size_t pixel = 0; pixel < rays_.size(); ++pixel) {
-    for (int c = 0; c < 3; ++c) sum[c] += decoded_[frames_[frame].rgb[3 * pixel + c]] / vignetting_[pixel];
+  for (size_t pixel = 0; pixel < pixels.rays.size(); ++pixel) {
+    for (int c = 0; c < 3; ++c)
+      sum[c] += decoded_[pixels.rgb[frame][3 * pixel + c]] / pixels.vignetting[pixel];
   }
-  return sum / (frames_[frame].gain * static_cast<double>(rays_.size()));
+  return sum / (frames_[frame].gain * static_cast<double>(pixels.rays.size()));
 }
 
 // Two independent numbers from the upper and the lower half.
-TrainingFrames::Place TrainingFrames::PlaceOf(uint64_t draw) const {
-  return {((draw >> 32) * frames_.size()) >> 32, ((draw & 0xffffffffull) * rays_.size()) >> 32};
+TrainingFrames::Place TrainingFrames::PlaceOf(uint64_t draw, const Pixels& pixels) const {
+  return {((draw >> 32) * frames_.size()) >> 32, ((draw & 0xffffffffull) * pixels.rays.size()) >> 32};
 }
 
 void TrainingFrames::Draw(uint64_t key, uint64_t first, const Vec3d& origin,
                           std::vector<RayBatch<float>::Ray>* rays) const {
-  const auto place = [&](size_t r) { return PlaceOf(RandomBits(key, first + r)); };
+  const Pixels& pixels = pixels_.value();
+  const auto place = [&](size_t r) { return PlaceOf(RandomBits(key, first + r), pixels); };
   // So that rays don't wait for memory one by one. (In a function of its own the compiler takes this for
   // nothing and leaves it out.)
   for (size_t r = 0; r < rays->size(); ++r) {
     const auto [frame, pixel] = place(r);
-    __builtin_prefetch(&frames_[frame].rgb[3 * pixel]);
-    __builtin_prefetch(&rays_[pixel]);
-    __builtin_prefetch(&vignetting_[pixel]);
-    __builtin_prefetch(&pattern_[pixel]);
+    __builtin_prefetch(&pixels.rgb[frame][3 * pixel]);
+    __builtin_prefetch(&pixels.rays[pixel]);
+    __builtin_prefetch(&pixels.vignetting[pixel]);
+    __builtin_prefetch(&pixels.pattern[pixel]);
   }
-  for (size_t r = 0; r < rays->size(); ++r) Fill(place(r), origin, &(*rays)[r]);
+  for (size_t r = 0; r < rays->size(); ++r) Fill(place(r), pixels, origin, &(*rays)[r]);
 }
 
-void TrainingFrames::ReleasePixels() {
-  for (Frame& frame : frames_) std::vector<uint8_t>().swap(frame.rgb);
-  std::vector<Vec3f>().swap(rays_);
-  std::vector<float>().swap(vignetting_);
-  std::vector<float>().swap(pattern_);
-}
-
-void TrainingFrames::Fill(const Place& place, const Vec3d& origin, RayBatch<float>::Ray* ray) const {
+void TrainingFrames::Fill(const Place& place, const Pixels& pixels, const Vec3d& origin,
+                          RayBatch<float>::Ray* ray) const {
   const auto [frame_index, pixel] = place;
   const Frame& frame = frames_[frame_index];
   const Pose& pose = poses_[frame_index];
   ray->origin = (pose.translation() - origin).cast<float>();
-  ray->direction = (pose.linear() * rays_[pixel].cast<double>()).cast<float>();
+  ray->direction = (pose.linear() * pixels.rays[pixel].cast<double>()).cast<float>();
   ray->frame = static_cast<int>(frame_index);
-  const float normaliser = static_cast<float>(frame.gain * Normaliser(pixel) * scale_);
-  ray->exposure = lit_ ? 1 / (pattern_[pixel] * static_cast<float>(scale_)) : 1.0f;
+  const float normaliser = static_cast<float>(frame.gain * pixels.Normaliser(pixel) * scale_);
+  ray->exposure = lit_ ? 1 / (pixels.pattern[pixel] * static_cast<float>(scale_)) : 1.0f;
   const float gamma = static_cast<float>(1 / inverse_gamma());
   const float darkest = std::pow(static_cast<float>(kHalfStep), gamma);
   ray->floor = darkest / normaliser;
   for (int c = 0; c < 3; ++c) {
-    const uint8_t value = frame.rgb[3 * pixel + c];
+    const uint8_t value = pixels.rgb[frame_index][3 * pixel + c];
     ray->bound[c] = value == 255 ? PixelBound::kAtLeast
                     : value == 0 ? PixelBound::kAtMost
                                  : PixelBound::kExact;

@@ -3,19 +3,15 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "common/sequence.h"
+#include "recon/training/memory.h"
 #include "recon/training/options.h"
 #include "recon/training/ray_loss.h"
 
 namespace lumen {
-
-// What the frames' pixels may take up at most with the sequence's mask, bytes. 20 frames of 1350×1080 fit in
-// whole. Of more or larger ones a part of the pixels is kept, the same of every frame and spread evenly: a
-// run of 9,000 iterations looks at 2.3 million rays in all, and even 700 frames keep 40 million pixels. While
-// frames are read, row by row, a megabyte of rows comes on top and a bit a pixel of the image.
-inline constexpr size_t kFrameBytes = 124'000'000;
 
 // `kept` of `available` places in ascending order, one at random in each of as many equal parts; all of them,
 // if kept ≥ available.
@@ -36,7 +32,7 @@ class TrainingFrames {
   const std::vector<Pose>& world_from_camera() const { return poses_; }
   const Light& light() const { return calibration_.light; }
   // Unit rays in camera axes of the image's valid pixels that are kept.
-  const std::vector<Vec3f>& pixel_rays() const { return rays_; }
+  const std::vector<Vec3f>& pixel_rays() const { return pixels_.value().rays; }
   // Of every frame, and for good.
   bool gains_known() const { return gains_known_; }
   // By how much the logarithm of a frame's gain may be off from what the sequence says: one standard error of
@@ -60,25 +56,32 @@ class TrainingFrames {
   // observed value and its bounds. Frame and pixel of ray r are chosen, uniformly, by (key, first + r).
   void Draw(uint64_t key, uint64_t first, const Vec3d& origin, std::vector<RayBatch<float>::Ray>* rays) const;
 
-  // Gives back what the pixels take up; from then on nothing may ask for rays, or for a frame's radiance.
-  void ReleasePixels();
+  // Gives back what the pixels take up. Who asks for rays or a frame's radiance afterwards gets
+  // std::bad_optional_access.
+  void ReleasePixels() { pixels_.reset(); }
 
  private:
   struct Frame {
-    std::vector<uint8_t> rgb;  // of the pixels kept, three each
-    double gain;               // 1 where unknown
+    double gain;  // 1 where unknown
     double log_gain_reach;
+  };
+  // That are kept, the same of every frame.
+  struct Pixels {
+    std::vector<Vec3f> rays;
+    std::vector<float> vignetting;
+    std::vector<float> pattern;             // L_e on its ray, mm²
+    std::vector<std::vector<uint8_t>> rgb;  // a frame: three a pixel
+    double Normaliser(size_t pixel) const { return double(vignetting[pixel]) * pattern[pixel]; }
   };
   struct Place {
     size_t frame, pixel;
   };
-  Place PlaceOf(uint64_t draw) const;
-  void Fill(const Place& place, const Vec3d& origin, RayBatch<float>::Ray* ray) const;
-  double Normaliser(size_t pixel) const;  // vignetting · L_e
-  // Fills what there is one of a pixel; their places in the image, ascending.
+  Place PlaceOf(uint64_t draw, const Pixels& pixels) const;
+  void Fill(const Place& place, const Pixels& pixels, const Vec3d& origin, RayBatch<float>::Ray* ray) const;
+  // Fills what pixels_ has one of a pixel; their places in the image, ascending.
   std::vector<uint32_t> FindPixels(const Calibration& calibration, size_t most);
   void ReadFrames(const Sequence& sequence, const std::vector<int>& indices,
-                  const std::vector<uint32_t>& pixels);
+                  const std::vector<uint32_t>& places);
   void FindScale(const Sequence& sequence);
 
   Calibration calibration_;  // without its mask
@@ -88,9 +91,8 @@ class TrainingFrames {
   std::vector<int> numbers_;
   std::vector<Pose> poses_;
   std::vector<Frame> frames_;
-  std::vector<Vec3f> rays_;
-  std::vector<float> vignetting_, pattern_;  // a valid pixel; pattern: L_e on its ray, mm²
-  double scale_ = 1;                         // 1/mm²: brings normalised pixels to a mean of one half
+  std::optional<Pixels> pixels_ = Pixels();
+  double scale_ = 1;  // 1/mm²: brings normalised pixels to a mean of one half
   float decoded_[256];
 };
 
