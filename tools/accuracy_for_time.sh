@@ -7,7 +7,9 @@
 set -euo pipefail
 source_folder=$(cd "$(dirname "$0")/.." && pwd)
 lumen=${LUMEN_BUILD:-$source_folder/build}/tools/lumen
-folder=${1:?"usage: $0 DIR [SCENE]..."}
+usage="usage: $0 DIR [SCENE]..."
+folder=${1:?"$usage"}
+[ "${folder#-}" = "$folder" ] || { echo "$usage" >&2; exit 2; }
 shift
 [ $# -gt 0 ] || set -- "$source_folder"/scenes/{colon,colon_ct,colon_lit}.toml
 seeds=(${SEEDS:-0 1 2})

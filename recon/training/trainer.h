@@ -97,8 +97,8 @@ class Trainer {
   void ClearGradients();
   double RateAt(double progress) const;
   bool KnowsPower() const;
-  double Settling(
-      double progress) const;  // how far the run has come on its way to settling; from 1 on it does
+  // How far the run has come on its way to settling; from 1 on it does.
+  double Settling(double progress) const;
   double SharpnessAt(double progress) const;
   LossSettings<float> SettingsAt(double progress) const;
   bool GradientsAreFinite() const;
