@@ -7,8 +7,9 @@
 namespace lumen {
 
 // The main parts of a step, in their order; what there is besides (cameras kept free, light between walls,
-// lengths of weights, gains and poses, chunks' gradients added up) is in none. Surface and colours are the field's forward passes with
-// derivatives and the shading; backward is through the networks; grid is the gradient's way into the tables.
+// lengths of weights, gains and poses, chunks' gradients added up) is in none. Surface and colours are the
+// field's forward passes with derivatives and the shading; backward is through the networks; grid is the
+// gradient's way into the tables.
 enum class Phase { kRays, kPlaces, kDistances, kSurface, kColors, kPixels, kBackward, kGrid, kAdam };
 inline constexpr std::array kPhaseNames = {"rays",   "places",   "distances", "surface", "colours",
                                            "pixels", "backward", "grid",      "adam"};
