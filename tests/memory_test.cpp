@@ -101,8 +101,7 @@ TEST_F(Memory, ARunTakesNoMoreThan300MB) {
     std::vector<std::string> more = {"--preset", run.preset, "--threads", "2"};
     for (const std::string& setting : run.settings) more.insert(more.end(), {"--set", setting});
     const int64_t peak = PeakOfTraining(4096, run.iterations, more);
-    const auto pixels =
-        static_cast<int64_t>(FrameBytes(ReadTrainOptions(run.preset, run.settings)));
+    const auto pixels = static_cast<int64_t>(FrameBytes(ReadTrainOptions(run.preset, run.settings)));
     EXPECT_LT(peak, kRun) << testing::PrintToString(more);
     EXPECT_GT(peak, program + pixels - kMask) << testing::PrintToString(more);
   }
